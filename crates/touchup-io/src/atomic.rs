@@ -1,4 +1,4 @@
-//! Files that are there whole or not at all.
+//! Files that appear whole or not at all.
 
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
@@ -8,15 +8,14 @@ use tempfile::TempPath;
 
 /// A file that appears under its name only by [`AtomicFile::commit`].
 ///
-/// Until then it lies beside its target under a temporary name; dropped without commit it is
-/// removed and an older file of that name stays untouched. A link is followed, also one that leads
-/// to no file yet, so that what it points to is replaced. What a process that was killed has left
-/// under a temporary name goes when the next one writes to the same place.
+/// Until then it lies beside its target under a temporary name; without commit, drop removes it and
+/// an older file of that name stays untouched. A link is followed, even to a missing file, and its
+/// target replaced. The next writer to the same place removes temporary files of killed processes.
 #[derive(Debug)]
 pub struct AtomicFile {
     target: PathBuf,
     writer: BufWriter<File>,
-    /// removes the file when it is dropped
+    /// removes the file on drop
     temporary: TempPath,
 }
 
@@ -24,8 +23,7 @@ impl AtomicFile {
     /// Opens a temporary file beside `path`.
     ///
     /// # Errors
-    /// The folder is missing, or may not be written to; `path` names something other than a plain
-    /// file.
+    /// The folder is missing or not writable; `path` names something other than a plain file.
     pub fn create(path: &Path) -> io::Result<Self> {
         let target = followed(path)?;
         let refused = |kind, why: String| Err(io::Error::new(kind, why));
@@ -60,18 +58,17 @@ impl AtomicFile {
         })
     }
 
-    /// Brings everything to the disk and gives the file its name, in place of an older one.
+    /// Syncs everything to disk and gives the file its name, in place of an older one.
     ///
     /// # Errors
-    /// Whatever writing, synchronising or renaming reports; the temporary file is then removed.
+    /// Any error of writing, synchronising or renaming, after removal of the temporary file.
     pub fn commit(mut self) -> io::Result<()> {
         self.writer.flush()?;
         self.writer.get_ref().sync_all()?;
         self.temporary
             .persist(&self.target)
             .map_err(|error| error.error)?;
-        // the new name is on the disk once its folder is; some file systems cannot be asked for
-        // that
+        // the new name is on the disk once its folder is; some file systems do not support that
         let _ = File::open(folder_of(&self.target)).and_then(|folder| folder.sync_all());
         Ok(())
     }
@@ -101,7 +98,7 @@ impl Seek for AtomicFile {
 /// Writes a whole file by `write`; on any error an older file of that name stays untouched.
 ///
 /// # Errors
-/// Those of [`AtomicFile`] and of `write`.
+/// As [`AtomicFile`] and `write`.
 pub fn write_atomically(
     path: &Path,
     write: impl FnOnce(&mut AtomicFile) -> io::Result<()>,
@@ -111,23 +108,23 @@ pub fn write_atomically(
     file.commit()
 }
 
-/// Makes a folder and those above it, as far as they are not there.
+/// Makes a folder and its missing parents.
 ///
 /// # Errors
-/// Whatever the system reports.
+/// Any system error.
 pub fn create_folder(path: &Path) -> io::Result<()> {
     fs::create_dir_all(path)
 }
 
-/// Whether both names lead to one file that is there.
+/// Whether both names lead to one existing file.
 pub fn is_same_file(a: &Path, b: &Path) -> bool {
     fs::canonicalize(a).is_ok_and(|a| fs::canonicalize(b).is_ok_and(|b| a == b))
 }
 
-/// Links behind one another at most, as on Linux.
+/// Maximum length of a chain of links, as on Linux.
 const MOST_LINKS: usize = 40;
 
-/// Where a path leads, whether a file is there or not.
+/// Target of a path, even if no file exists there.
 fn followed(path: &Path) -> io::Result<PathBuf> {
     let mut target = path.to_path_buf();
     for _ in 0..MOST_LINKS {
@@ -145,8 +142,7 @@ fn followed(path: &Path) -> io::Result<PathBuf> {
     ))
 }
 
-/// Removes temporary files `stem`PID-….part of processes that are gone. Where that cannot be known
-/// they stay.
+/// Removes temporary files `stem`PID-….part of dead processes; without `/proc` they stay.
 pub(super) fn remove_left(folder: &Path, stem: &str) {
     let (processes, Ok(entries)) = (Path::new("/proc"), fs::read_dir(folder)) else {
         return;
@@ -166,7 +162,7 @@ pub(super) fn remove_left(folder: &Path, stem: &str) {
             .parse::<u32>()
             .is_ok_and(|id| !processes.join(id.to_string()).exists())
         {
-            // who may not remove it leaves it
+            // without permission it stays
             let _ = fs::remove_file(entry.path());
         }
     }

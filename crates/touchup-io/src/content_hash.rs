@@ -1,4 +1,4 @@
-//! What a file holds, as a number of 256 bits: the same for the same bytes, wherever they lie.
+//! A file's content as a number of 256 bits: equal for equal bytes, wherever they lie.
 
 use std::fs;
 use std::io::{self, Read};
@@ -8,9 +8,9 @@ use sha2::{Digest, Sha256};
 
 use crate::file_error::{FileError, open_up_to};
 
-/// Read at once, bytes.
+/// Size of one read, bytes.
 const CHUNK: usize = 1 << 16;
-/// Files of a folder at most: a recording in parts has a few.
+/// Maximum number of files in a folder: a recording in parts has a few.
 const MOST_FILES: usize = 10_000;
 
 /// SHA-256 of bytes, as `sha256sum` prints it.
@@ -18,8 +18,8 @@ pub fn hash_of(bytes: &[u8]) -> String {
     hex(Sha256::new_with_prefix(bytes))
 }
 
-/// SHA-256 of a file, as `sha256sum` prints it; of a folder, as of a recording in parts, that of a
-/// list: a line with hash, two spaces and path for each file below it, ordered by path.
+/// SHA-256 of a file, as `sha256sum` prints it; for a folder, as a recording in parts, the SHA-256
+/// of a list: a line with hash, two spaces and path for each file below it, ordered by path.
 ///
 /// # Errors
 /// [`FileError::Read`]
@@ -45,7 +45,7 @@ pub fn content_hash(path: &Path) -> Result<String, FileError> {
 }
 
 fn file_hash(path: &Path) -> io::Result<String> {
-    // of a file that has an end, however far
+    // without a size limit for a regular file
     let (mut file, mut hash) = (open_up_to(path, u64::MAX - 1)?, Sha256::new());
     let mut chunk = vec![0; CHUNK];
     loop {
@@ -56,7 +56,7 @@ fn file_hash(path: &Path) -> io::Result<String> {
     }
 }
 
-/// By their paths from `folder`, in order.
+/// Files by their paths from `folder`, in order.
 fn files_below(folder: &Path) -> io::Result<Vec<PathBuf>> {
     let (mut files, mut folders) = (Vec::new(), vec![PathBuf::new()]);
     while let Some(inner) = folders.pop() {

@@ -1,5 +1,4 @@
-//! What can be wrong with any file: it cannot be read or written, and the place of what is wrong in
-//! it.
+//! Errors common to all files: failed reads and writes, and the place of a fault in a file.
 
 use std::fmt;
 use std::fs::File;
@@ -11,25 +10,25 @@ use super::atomic::{AtomicFile, write_atomically};
 /// Why the system did not read or write a file.
 #[derive(Debug, thiserror::Error)]
 pub enum FileError {
-    /// It could not be read.
+    /// A failed read.
     #[error("cannot read {}: {source}", path.display())]
     Read {
         /// the file
         path: PathBuf,
-        /// what the system reports
+        /// the system's error
         source: io::Error,
     },
-    /// It could not be written.
+    /// A failed write.
     #[error("cannot write {}: {source}", path.display())]
     Write {
         /// the file
         path: PathBuf,
-        /// what the system reports
+        /// the system's error
         source: io::Error,
     },
 }
 
-/// Where in a file.
+/// Place in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FilePlace {
     /// counted from 1
@@ -37,8 +36,7 @@ pub enum FilePlace {
     /// counted from 0; in a recording the offset of the record (for a chunk: of the whole chunk) in
     /// the MCAP stream
     Byte(u64),
-    /// `id` in the table `messages`; what fails inside SQLite is placed at the last row that could
-    /// be read
+    /// `id` in the table `messages`; for failures inside SQLite the last readable row
     Row(i64),
 }
 
@@ -52,20 +50,19 @@ impl fmt::Display for FilePlace {
     }
 }
 
-/// Longest file that is read as a whole: its numbers take several times that.
+/// Longest file for a read as a whole: its numbers take several times that.
 pub(super) const MAX_FILE_BYTES: u64 = 4 << 30;
-/// … and longest input whose end is not known before, as that of a pipe.
+/// Longest input of unknown length, such as a pipe.
 const MAX_STREAM_BYTES: u64 = 256 << 20;
 
-/// A file, or what comes out of a pipe, with an error in place of what is beyond a limit.
+/// A file or a pipe, with an error in place of bytes beyond a limit.
 pub(super) struct LimitedFile {
     file: Take<File>,
     bytes: u64,
     limit: u64,
 }
 
-/// Opens a file that is not longer than `limit`, nor than [`MAX_STREAM_BYTES`] if its end is not
-/// known before.
+/// Opens a file no longer than `limit`, nor than [`MAX_STREAM_BYTES`] if its length is unknown.
 pub(super) fn open_up_to(path: &Path, limit: u64) -> io::Result<LimitedFile> {
     let file = File::open(path)?;
     let info = file.metadata()?;
@@ -98,7 +95,7 @@ fn too_long(limit: u64) -> io::Error {
     io::Error::new(io::ErrorKind::FileTooLarge, why)
 }
 
-/// All bytes of what [`open_up_to`] opens.
+/// All bytes behind [`open_up_to`].
 pub(super) fn read_up_to(path: &Path, limit: u64) -> io::Result<Vec<u8>> {
     let mut file = open_up_to(path, limit)?;
     let mut bytes = Vec::new();
@@ -107,7 +104,7 @@ pub(super) fn read_up_to(path: &Path, limit: u64) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// All bytes of a file that is not longer than [`MAX_FILE_BYTES`].
+/// All bytes of a file no longer than [`MAX_FILE_BYTES`].
 pub(super) fn read_file(path: &Path) -> Result<Vec<u8>, FileError> {
     read_up_to(path, MAX_FILE_BYTES).map_err(|source| FileError::Read {
         path: path.to_owned(),
@@ -142,7 +139,7 @@ mod tests {
             stream.unwrap_err().to_string(),
             "it is longer than 256 MiB: reduce it first"
         );
-        // of a file that is long, and has nothing on the disk, nothing is read
+        // a long sparse file is refused before any read
         let file = tempfile::NamedTempFile::new().unwrap();
         file.as_file().set_len(1 << 42).unwrap();
         assert_eq!(said(read_up_to(file.path(), 3 << 20)), wanted);

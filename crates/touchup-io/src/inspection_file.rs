@@ -11,11 +11,11 @@ use super::file_error::{FileError, write_file};
 /// A whole inspection.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct InspectionRecord {
-    /// name or number of the part, where it was told
+    /// name or number of the part, if known
     pub part: Option<String>,
-    /// of this one part
+    /// serial number of this part
     pub serial: Option<String>,
-    /// who inspected
+    /// inspector
     pub operator: Option<String>,
     /// day and time, UTC, RFC 3339
     pub date: String,
@@ -27,33 +27,30 @@ pub struct InspectionRecord {
     pub confidence: f64,
     /// k of the expanded uncertainties
     pub coverage_factor: f64,
-    /// of the whole: `fail` where one characteristic fails, else `undecided` where one is, else
-    /// `pass`
+    /// of the whole: `fail` if one characteristic fails, else `undecided` if one is, else `pass`
     pub verdict: String,
     /// by decision
     pub counts: BTreeMap<String, usize>,
-    /// what it rests on
+    /// input files
     pub files: Vec<InspectedFile>,
-    /// how drawing and part were brought into one frame; left out where both were taken to be in
-    /// that of the mesh
+    /// alignment of drawing and part; absent if both use the frame of the mesh
     #[serde(skip_serializing_if = "Option::is_none")]
     pub alignment: Option<AlignmentRecord>,
     /// in the order of the drawing
     pub characteristics: Vec<CharacteristicRecord>,
-    /// measured holes, slots, pockets, bosses, cylinders and notches that no characteristic is
-    /// about, by `id`
+    /// measured holes, slots, pockets, bosses, cylinders and notches without a characteristic, by
+    /// `id`
     pub without_characteristic: Vec<u32>,
-    /// what else has to be known, a sentence each
+    /// further remarks, a sentence each
     pub notes: Vec<String>,
 }
 
-/// The motion that takes the frame of the mesh into that of the drawing: x ↦ rotation · x +
-/// translation.
+/// The motion from the frame of the mesh to that of the drawing: x ↦ rotation · x + translation.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct AlignmentRecord {
     /// `best-fit` or `datums`
     pub method: String,
-    /// the features that it rests on, datums in their order
+    /// features of the alignment, datums in their order
     pub features: Vec<AlignedFeatureRecord>,
     /// rows of its matrix
     pub rotation: [[f64; 3]; 3],
@@ -65,7 +62,7 @@ pub struct AlignmentRecord {
     pub center_mm: [f64; 3],
     /// standard uncertainties of the shift there, in the frame of the drawing
     pub translation_std_mm: [f64; 3],
-    /// … of the turn
+    /// standard uncertainties of the rotation
     pub rotation_std_deg: [f64; 3],
     /// root mean square of `residual_mm`
     pub residual_rms_mm: f64,
@@ -73,7 +70,7 @@ pub struct AlignmentRecord {
     pub residual_max_mm: f64,
 }
 
-/// A feature that an alignment rests on.
+/// A feature of an alignment.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct AlignedFeatureRecord {
     /// of a characteristic of it in the drawing
@@ -82,13 +79,13 @@ pub struct AlignedFeatureRecord {
     pub kind: String,
     /// `id` of the measured feature
     pub feature: u32,
-    /// how far it is off its nominal place after the alignment: across its axis, of a plane along
-    /// its normal
+    /// distance from its nominal place after the alignment: across its axis, for a plane along its
+    /// normal
     pub residual_mm: f64,
 }
 
 impl InspectionRecord {
-    /// What positions and coordinates are about: `mesh`, or the frame of the drawing.
+    /// Frame of positions and coordinates: `mesh`, or the frame of the drawing.
     pub fn frame(&self) -> String {
         let Some(AlignmentRecord {
             method, features, ..
@@ -111,12 +108,12 @@ impl InspectionRecord {
     }
 }
 
-/// A file that an inspection rests on.
+/// An input file of an inspection.
 #[derive(Clone, Debug, Serialize)]
 pub struct InspectedFile {
-    /// what it is
+    /// role of the file
     pub role: String,
-    /// as it was named
+    /// path as given
     pub path: String,
     /// its length
     pub bytes: u64,
@@ -133,39 +130,39 @@ pub struct CharacteristicRecord {
     pub name: String,
     /// kind of the feature
     pub kind: String,
-    /// `id` of the feature; left out where none was found
+    /// `id` of the feature; absent if none was found
     #[serde(skip_serializing_if = "Option::is_none")]
     pub feature: Option<u32>,
     /// `id` of the datum
     #[serde(skip_serializing_if = "Option::is_none")]
     pub datum: Option<u32>,
-    /// what of it, with its unit
+    /// inspected quantity, with its unit
     pub quantity: String,
-    /// numbers by name and unit, those of [`NUMBERS`]; what is not known is left out
+    /// numbers by name and unit, as in [`NUMBERS`]; unknown ones are absent
     #[serde(flatten)]
     pub numbers: BTreeMap<String, f64>,
     /// whether the actual value is a lower bound
     pub is_at_least: bool,
-    /// where the tolerance is from: `drawing`, `iso2768-m`, …
+    /// source of the tolerance, such as `drawing` or `iso2768-m`
     pub tolerance_from: String,
     /// `pass`, `undecided` or `fail`
     pub decision: String,
-    /// why nothing was decided, and what to do
+    /// reason for no decision, and the remedy
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
-    /// that it conforms
+    /// probability of conformance
     #[serde(skip_serializing_if = "Option::is_none")]
     pub conformance_probability: Option<f64>,
-    /// that the decision is wrong; of undecided ones left out
+    /// probability of a wrong decision; absent for undecided ones
     #[serde(skip_serializing_if = "Option::is_none")]
     pub risk: Option<f64>,
-    /// how many touches are behind it
+    /// number of touches in the fit
     pub touches: usize,
     /// `touches` or `mesh`
     pub fitted_to: String,
 }
 
-/// Names of the numbers of a characteristic, each with `_mm` or `_deg` behind it.
+/// Names of the numbers of a characteristic, each followed by `_mm` or `_deg`.
 pub const NUMBERS: [&str; 11] = [
     "nominal",
     "lower_limit",
@@ -193,7 +190,7 @@ impl CharacteristicRecord {
             .copied()
     }
 
-    /// Puts a number down.
+    /// Stores a number.
     pub fn set(&mut self, name: &str, number: Option<f64>) {
         debug_assert!(NUMBERS.contains(&name), "{name}");
         if let Some(number) = number {
@@ -245,10 +242,10 @@ const BEHIND: [&str; 9] = [
     "frame",
 ];
 
-/// Writes the characteristics as a table, as a whole or not at all; columns in degrees only where
+/// Writes the characteristics as a table, as a whole or not at all; columns in degrees only if
 /// there is an angle.
 ///
-/// - `frame`: what positions and coordinates are about, in each line.
+/// - `frame`: frame of positions and coordinates, in each line.
 ///
 /// # Errors
 /// [`FileError::Write`].

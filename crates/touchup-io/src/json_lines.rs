@@ -15,22 +15,22 @@ const LONGEST: u64 = 1 << 20;
 /// Why a line was not read.
 #[derive(Debug, thiserror::Error)]
 pub enum JsonLineError {
-    /// The system refused.
+    /// A system error.
     #[error(transparent)]
     File(#[from] FileError),
-    /// It is no such object.
+    /// Not a valid object.
     #[error("{}: {place}: {why}", path.display())]
     Line {
         /// the file
         path: PathBuf,
-        /// which
+        /// line
         place: FilePlace,
-        /// what is wrong
+        /// the fault
         why: String,
     },
 }
 
-/// The objects of a file, in its order; after an error there are no more.
+/// The objects of a file, in its order; an error ends them.
 #[derive(Debug)]
 pub struct JsonLines<T> {
     path: PathBuf,

@@ -2,9 +2,8 @@
 //! disk.
 #![cfg_attr(not(test), warn(clippy::unwrap_used))]
 
-/// Declares a struct of a report and how it is made, a field at a time: its name with the unit, its
-/// type, and the number that it shows. A field `name?` is left out of JSON where it is `None`, and
-/// has the type within the `Option`.
+/// Declares a report's struct and its constructor, a field at a time: name with unit, type, and
+/// reported number. A field `name?` has the type within the `Option`, and JSON omits its `None`.
 ///
 /// ```
 /// touchup_io::reported! {
@@ -32,7 +31,7 @@ macro_rules! reported {
         }
 
         impl $Name {
-            /// What is reported of these.
+            /// The report.
             $of fn of($($from: $From),*) -> Self {
                 Self { $($field: $value,)* }
             }

@@ -3,13 +3,12 @@
 use std::fs;
 use std::thread::available_parallelism;
 
-/// The commit that the program is built from, and whether something was changed since; "unknown"
-/// where there is no checkout.
+/// Commit of the build, with a mark for later changes; "unknown" without a checkout.
 pub const COMMIT: &str = env!("TOUCHUP_COMMIT");
 /// Version and commit.
 pub const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), " (", env!("TOUCHUP_COMMIT"), ")");
 
-/// Processor, threads that run at the same time, memory, and system, where known.
+/// Processor, hardware threads, memory, and system, where known.
 pub fn describe_machine() -> String {
     let processor = fs::read_to_string("/proc/cpuinfo")
         .ok()
@@ -34,7 +33,7 @@ pub fn describe_machine() -> String {
     parts.into_iter().flatten().collect::<Vec<_>>().join(", ")
 }
 
-/// The value behind `key` and `:` or `=`, the first time, without quotes.
+/// The value behind the first `key` and `:` or `=`, without quotes.
 fn value_of(text: &str, key: &str) -> Option<String> {
     let value = |line: &str| {
         let rest = line

@@ -1,7 +1,7 @@
 //! Points picked by hand, as comma-separated values, mm.
 //!
-//! `scan_x_mm,scan_y_mm,scan_z_mm,space_x_mm,space_y_mm,space_z_mm`, and where wanted `name` and
-//! `sigma_mm` (standard deviation of the pair per axis). How tables are written: [`super::table`].
+//! `scan_x_mm,scan_y_mm,scan_z_mm,space_x_mm,space_y_mm,space_z_mm`, and optionally `name` and
+//! `sigma_mm` (standard deviation of the pair per axis). Form of tables: [`super::table`].
 
 use std::path::Path;
 
@@ -20,7 +20,7 @@ const SIGMA: &str = "sigma_mm";
 pub struct PairsFile {
     /// From the scan to space, m.
     pub pairs: Vec<PointPair>,
-    /// What each is called; its place in the file, from 1 on, where it has no name.
+    /// Name of each; its place in the file, from 1 on, if it has no name.
     pub names: Vec<String>,
 }
 
@@ -123,7 +123,7 @@ mod tests {
         );
     }
 
-    /// As a spreadsheet saves it where decimals have a comma.
+    /// As saved by a spreadsheet with decimal commas.
     #[test]
     fn a_table_has_one_decimal_sign() {
         let text = "\u{feff}\"name\";\"scan_x_mm\";scan_y_mm;scan_z_mm;space_x_mm;space_y_mm;space_z_mm\r\n\

@@ -4,13 +4,13 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
-/// More than that is no parameter file, bytes.
+/// Maximum size of a parameter file, bytes.
 const LARGEST: u64 = 1 << 20;
 
 /// The text of the file.
 ///
 /// # Errors
-/// What the system says; [`io::ErrorKind::FileTooLarge`] beyond a megabyte.
+/// Any system error; [`io::ErrorKind::FileTooLarge`] beyond a megabyte.
 pub fn read(path: &Path) -> io::Result<String> {
     let mut text = String::new();
     let length = File::open(path)?

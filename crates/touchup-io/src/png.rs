@@ -12,16 +12,15 @@ use super::atomic::write_atomically;
 /// - `pixels`: row by row from the top, three bytes each.
 ///
 /// # Errors
-/// [`io::ErrorKind::InvalidInput`] where `pixels` are not as many as `size` says; whatever the disk
-/// reports.
+/// [`io::ErrorKind::InvalidInput`] if the number of `pixels` differs from `size`; any disk error.
 pub fn write_png(path: &Path, size: [u32; 2], pixels: &[u8]) -> io::Result<()> {
     write_atomically(path, |out| encode(out, size, pixels))
 }
 
-/// The bytes of such a file, as a page holds them.
+/// The bytes of such a file, for embedding in a page.
 ///
 /// # Errors
-/// [`io::ErrorKind::InvalidInput`] where `pixels` are not as many as `size` says.
+/// [`io::ErrorKind::InvalidInput`] if the number of `pixels` differs from `size`.
 pub fn png_bytes(size: [u32; 2], pixels: &[u8]) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     encode(&mut bytes, size, pixels)?;

@@ -1,7 +1,7 @@
-//! `probed_touches.jsonl`: all that was seen of each touch of an arm, a line of JSON each.
+//! `probed_touches.jsonl`: a full record of each touch of an arm, a line of JSON each.
 //!
-//! Each line is on the disk before the arm makes the next touch, so that whatever ends the program
-//! loses none of them. What a crash leaves of a line is no touch.
+//! Each line is on the disk before the arm makes the next touch, so a killed program loses
+//! none. An incomplete line after a crash is no touch.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -27,14 +27,14 @@ reported! {
         pub begun_ns?: i64 = touch.record.as_ref().map(|record| record.stamps_ns[0] + offset_ns),
         /// by the clock of the recording
         pub ended_ns?: i64 = touch.record.as_ref().map(|record| record.stamps_ns[1] + offset_ns),
-        /// `clean`, `slip`, `edge`, `bounce`, `impact`, `miss`, `unclear`, or `held_back` where it
-        /// was not made
+        /// `clean`, `slip`, `edge`, `bounce`, `impact`, `miss`, `unclear`, or `held_back` for a
+        /// touch not made
         pub verdict: String = verdict(touch).to_owned(),
-        /// whether the feature is measured by it
+        /// whether it contributes to the feature
         pub accepted: bool = touch.refused.is_none(),
-        /// why not
+        /// reason for rejection
         pub reason?: String = touch.refused.clone(),
-        /// centre of the ball where the search begins
+        /// centre of the ball at the start of the search
         pub from_mm: [f64; 3] = (touch.planned.from * 1e3).coords.into(),
         /// direction of the search, unit vector
         pub approach: [f64; 3] = touch.planned.direction.into_inner().into(),
@@ -52,8 +52,8 @@ reported! {
         pub tip_radius_mm: f64 = ball_radius * 1e3,
         /// of the whole touch
         pub largest_force_n?: f64 = touch.record.as_ref().map(|record| record.peak_force),
-        /// seconds, travel in mm, force against the approach and across it in N; going in and
-        /// coming out
+        /// seconds, travel in mm, force against the approach and across it in N; approach and
+        /// retreat
         pub curve: Vec<[f64; 4]> = touch.record.iter().flat_map(|record| &record.curve).map(moment).collect(),
     }
 }
@@ -99,14 +99,14 @@ fn verdict(touch: &ProbedTouch) -> &'static str {
     }
 }
 
-/// The file of an arm that probes: each touch is appended as it is made.
+/// The touch file of a probing arm, one line per touch.
 #[derive(Debug)]
 pub struct TouchLog {
     path: PathBuf,
     file: File,
     /// m
     ball_radius: f64,
-    /// touches of each feature so far
+    /// touches of each feature up to now
     counts: BTreeMap<u32, usize>,
 }
 
@@ -116,7 +116,7 @@ impl TouchLog {
     /// - `ball_radius`: of the tip, m.
     ///
     /// # Errors
-    /// Of the file.
+    /// Any error of the file.
     pub fn create(path: &Path, ball_radius: f64) -> io::Result<Self> {
         Ok(Self {
             path: path.to_owned(),
@@ -126,13 +126,12 @@ impl TouchLog {
         })
     }
 
-    /// Goes on behind the touches of a file, which are counted on; what a crash left of a line is
-    /// removed.
+    /// Continues the touches of a file and their count; removes an incomplete line after a crash.
     ///
     /// - `ball_radius`: of the tip, m.
     ///
     /// # Errors
-    /// Of the file, also where a whole line of it is no touch.
+    /// Any error of the file, also for a whole line that is no touch.
     pub fn resume(path: &Path, ball_radius: f64) -> io::Result<Self> {
         let text = read_up_to(path, MAX_FILE_BYTES)?;
         let whole = whole_lines(&text);
@@ -155,7 +154,7 @@ impl TouchLog {
     /// - `offset_ns`: from the arm's clock to that of the recording, ns.
     ///
     /// # Errors
-    /// Of the file.
+    /// Any error of the file.
     pub fn append(&mut self, flag: u32, touch: &ProbedTouch, offset_ns: i64) -> io::Result<()> {
         let count = self.counts.entry(flag).or_default();
         let mut line = Vec::new();
@@ -168,21 +167,21 @@ impl TouchLog {
         self.file.sync_data()
     }
 
-    /// Where it is.
+    /// Path of the file.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// How many touches it holds.
+    /// Number of touches in it.
     pub fn count(&self) -> usize {
         self.counts.values().sum()
     }
 }
 
-/// All touches of a file, in their order; none where there is no file.
+/// All touches of a file, in their order; none without a file.
 ///
 /// # Errors
-/// Of the file, also where a whole line of it is no touch.
+/// Any error of the file, also for a whole line that is no touch.
 pub fn read_probed_touches(path: &Path) -> io::Result<Vec<TouchLine>> {
     match read_up_to(path, MAX_FILE_BYTES) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(Vec::new()),
@@ -197,7 +196,7 @@ fn touches_of(lines: &[u8]) -> io::Result<Vec<TouchLine>> {
         .collect()
 }
 
-/// Without what a crash left of the last line.
+/// The text without an incomplete last line.
 fn whole_lines(text: &[u8]) -> &[u8] {
     let end = text
         .iter()
@@ -206,12 +205,12 @@ fn whole_lines(text: &[u8]) -> &[u8] {
     &text[..end]
 }
 
-/// Writes the touches of one more feature behind those that are there.
+/// Appends the touches of one more feature.
 ///
 /// - `offset_ns`: from the arm's clock to that of the file, ns.
 ///
 /// # Errors
-/// Of the file.
+/// Any error of the file.
 pub fn append_probed_touches(
     probed: &Probed,
     ball_radius: f64,

@@ -1,9 +1,8 @@
-//! Results of an inspection as QIF 3.0 (ANSI/DMSC QIF 3.0, ISO 23952:2020), which programs of
-//! metrology read.
+//! Results of an inspection as QIF 3.0 (ANSI/DMSC QIF 3.0, ISO 23952:2020), for metrology programs.
 //!
-//! Written are the characteristics in their four aspects, definition, nominal, item and
-//! measurement, each measured value with its standard uncertainty, and the status of the part.
-//! Features, datum reference frames and touches are not written.
+//! The file holds the characteristics in their four aspects, definition, nominal, item and
+//! measurement, each measured value with its standard uncertainty, and the status of the part. It
+//! omits features, datum reference frames and touches.
 
 use std::fmt::Write as _;
 use std::io::Write;
@@ -22,8 +21,8 @@ pub fn write_qif(path: &Path, record: &InspectionRecord) -> Result<(), FileError
     write_file(path, |out| out.write_all(text.as_bytes()))
 }
 
-/// Identifiers: of the component, of the results, of the standard that says what the
-/// characteristics mean, then four of each characteristic.
+/// Identifiers: of the component, the results, the standard that defines the characteristics, then
+/// four of each characteristic.
 const COMPONENT: usize = 1;
 const RESULTS: usize = 2;
 const STANDARD: usize = 3;
@@ -131,7 +130,7 @@ fn document(record: &InspectionRecord) -> String {
     )
 }
 
-/// What the characteristic is called in QIF.
+/// Name of the characteristic in QIF.
 fn name_of(one: &CharacteristicRecord) -> &'static str {
     match InspectedQuantity::of_name(&one.quantity) {
         Some(InspectedQuantity::Diameter) | None => "Diameter",
@@ -267,7 +266,7 @@ fn measurement(one: &CharacteristicRecord, ids: &Ids) -> String {
     aspect(one, "Measurement", ids.measurement, &content)
 }
 
-/// What QIF has no place for, by names of this program.
+/// Data without a place in QIF, under names of this program.
 fn attributes(all: impl IntoIterator<Item = (&'static str, String)>) -> String {
     let each: Vec<_> = all
         .into_iter()
@@ -294,7 +293,7 @@ fn token(text: &str) -> String {
     escaped(&text.split_whitespace().collect::<Vec<_>>().join(" "))
 }
 
-/// A text as XML has it; what XML 1.0 has no place for is replaced.
+/// A text in XML; characters invalid in XML 1.0 are replaced.
 fn escaped(text: &str) -> String {
     let mut xml = String::with_capacity(text.len());
     for letter in text.chars() {
@@ -311,8 +310,8 @@ fn escaped(text: &str) -> String {
     xml
 }
 
-/// The same results have the same identifier: FNV-1a of 128 bits [Fowler, Noll and Vo] over them,
-/// as a UUID of version 8 (RFC 9562).
+/// Identifier, equal for equal results: FNV-1a of 128 bits [Fowler, Noll and Vo] over them, as a
+/// UUID of version 8 (RFC 9562).
 fn document_id(record: &InspectionRecord) -> String {
     const BASIS: u128 = 0x6c62_272e_07bb_0142_62b8_2175_6295_c58d;
     const PRIME: u128 = 0x0000_0000_0100_0000_0000_0000_0000_013b;

@@ -1,9 +1,8 @@
-//! Folders that are there whole or not at all, whoever else makes the same one at the same time.
+//! Folders that appear whole or not at all, even if several processes make the same one.
 //!
-//! A folder is made under a temporary name beside its place, while a lock of its name is held, and
-//! renamed once all of it is on the disk. The system lets go of the lock of a process that is
-//! killed, on another machine too where the file system is shared; who gets it next removes what
-//! that process left.
+//! A process makes a folder under a temporary name beside its place, while it holds a lock of its
+//! name, and renames it once all of it is on the disk. The system releases the lock of a killed
+//! process, on another machine too for a shared file system; the next owner removes its remains.
 
 use std::fs::{self, File, TryLockError};
 use std::io;
@@ -13,29 +12,28 @@ use tempfile::TempDir;
 
 use crate::file_error::FileError;
 
-/// How a name is claimed.
+/// Result of a claim.
 #[derive(Debug)]
 pub enum Claim {
-    /// the folder is there
+    /// the folder exists
     Done(PathBuf),
-    /// it is to be made
+    /// the folder is ours to make
     Ours(ClaimedFolder),
 }
 
-/// A folder that is to be made by nobody else meanwhile.
+/// A folder in the making, reserved for this process.
 #[derive(Debug)]
 pub struct ClaimedFolder {
     place: PathBuf,
     /// of the names of temporary folders
     prefix: String,
-    /// vanishes when it is dropped
+    /// vanishes on drop
     temporary: TempDir,
     _lock: Option<NameLock>,
 }
 
-/// Bytes as a file, for readers of files, in a folder of its own beside the one that is made. It
-/// vanishes when this is dropped; what a killed process leaves of it goes with the next claim of
-/// the name.
+/// Bytes as a file, for readers of files, in a temporary folder beside the claimed one. It vanishes
+/// on drop; the next claim of the name removes remains of a killed process.
 #[derive(Debug)]
 pub struct FileBeside {
     path: PathBuf,
@@ -43,7 +41,7 @@ pub struct FileBeside {
 }
 
 impl FileBeside {
-    /// Where it lies.
+    /// Path of the file.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -56,10 +54,10 @@ struct NameLock {
     _file: File,
 }
 
-/// Claims the folder `name` in `folder`, which is made where it is not there. Waits while another
-/// process makes it.
+/// Claims the folder `name` in `folder`, which is made if missing. Waits while another process
+/// makes it.
 ///
-/// - `again`: also where it is there; the new one takes its place.
+/// - `again`: replaces an existing one.
 ///
 /// # Errors
 /// [`FileError::Write`]
@@ -96,14 +94,14 @@ pub fn claim(folder: &Path, name: &str, again: bool) -> Result<Claim, FileError>
 const PART: &str = ".part";
 
 impl ClaimedFolder {
-    /// Where its files are to be written.
+    /// Place for its files.
     pub fn path(&self) -> &Path {
         self.temporary.path()
     }
 
-    /// Bytes that it is made of, as a file.
+    /// Input bytes of the folder, as a file.
     ///
-    /// - `name`: has the ending that readers look at.
+    /// - `name`: has the ending for the reader.
     ///
     /// # Errors
     /// [`FileError::Write`]
@@ -123,8 +121,7 @@ impl ClaimedFolder {
         })
     }
 
-    /// Gives the folder its name. Another one that has come there meanwhile stays, unless it is to
-    /// be replaced.
+    /// Gives the folder its name. Another one made meanwhile stays, unless `again`.
     ///
     /// - `again`: as of [`claim`].
     ///
@@ -141,8 +138,7 @@ impl ClaimedFolder {
             let folder = place.parent().unwrap_or(Path::new("."));
             sync(temporary.path());
             if again && place.is_dir() {
-                // a folder cannot be replaced by renaming: the old one steps aside, and vanishes
-                // with this
+                // renaming cannot replace a folder: the old one steps aside, and vanishes with this
                 let aside = temporary_in(folder, &prefix)?;
                 fs::rename(&place, aside.path().join("old"))?;
                 fs::rename(temporary.path(), &place)?;
@@ -163,7 +159,7 @@ impl ClaimedFolder {
     }
 }
 
-/// A folder that others may read as any other.
+/// A folder with usual permissions for others.
 fn temporary_in(folder: &Path, prefix: &str) -> io::Result<TempDir> {
     let mut temporary = tempfile::Builder::new();
     temporary.prefix(prefix).suffix(PART);
@@ -172,13 +168,13 @@ fn temporary_in(folder: &Path, prefix: &str) -> io::Result<TempDir> {
     temporary.tempdir_in(folder)
 }
 
-/// A new name is on the disk once its folder is; some file systems cannot be asked for that.
+/// A new name is on the disk once its folder is; some file systems do not support that.
 fn sync(folder: &Path) {
     let _ = File::open(folder).and_then(|folder| folder.sync_all());
 }
 
 impl NameLock {
-    /// Waits until nobody else has it; `None` where the file system has no locks.
+    /// Waits for exclusive ownership; `None` for a file system without locks.
     fn take(path: PathBuf) -> io::Result<Option<Self>> {
         loop {
             let file = File::options().create(true).append(true).open(&path)?;
@@ -190,8 +186,8 @@ impl NameLock {
                 Err(TryLockError::Error(error)) => return Err(error),
                 Ok(()) => {}
             }
-            // who had it before may have removed the file: then another one has the name, and
-            // others lock that
+            // a former owner may have removed the file: then the name leads to another one, which
+            // others lock
             if is_at(&file, &path) {
                 return Ok(Some(Self { path, _file: file }));
             }
@@ -199,7 +195,7 @@ impl NameLock {
     }
 }
 
-/// Removes the file before the system lets go of it.
+/// Removes the file before the system releases it.
 impl Drop for NameLock {
     fn drop(&mut self) {
         let _ = fs::remove_file(&self.path);
@@ -214,13 +210,13 @@ fn is_at(file: &File, path: &Path) -> bool {
         .is_ok_and(|own| fs::metadata(path).is_ok_and(|there| number(own) == number(there)))
 }
 
-/// There an open file cannot be removed.
+/// Such systems do not remove open files.
 #[cfg(not(unix))]
 fn is_at(_: &File, _: &Path) -> bool {
     true
 }
 
-/// Removes temporary folders of a name: who made them let go of its lock.
+/// Removes temporary folders of a name: their makers have released its lock.
 fn remove_left(folder: &Path, prefix: &str) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         let name = entry.file_name();
@@ -228,7 +224,7 @@ fn remove_left(folder: &Path, prefix: &str) {
             .to_str()
             .is_some_and(|name| name.starts_with(prefix) && name.ends_with(PART))
         {
-            // who may not remove it leaves it
+            // without permission it stays
             let _ = fs::remove_dir_all(entry.path());
         }
     }

@@ -1,6 +1,6 @@
 //! Numbers of eight types in binary files and messages.
 
-/// Declares the types: of each its name here, that of Rust, and those in PLY files.
+/// Declares the types: each one's name here, in Rust, and in PLY files.
 macro_rules! scalars {
     ($($Scalar:ident: $type:ty = $($name:literal)|+;)*) => {
         /// Type of a number.
@@ -10,7 +10,7 @@ macro_rules! scalars {
         }
 
         impl Scalar {
-            /// In the order in which `sensor_msgs/msg/PointField` counts them, from 1 on.
+            /// In the order of `sensor_msgs/msg/PointField`, which counts from 1.
             pub const ALL: &[Self] = &[$(Self::$Scalar),*];
 
             /// By its name in a PLY file.
@@ -21,7 +21,7 @@ macro_rules! scalars {
                 }
             }
 
-            /// Bytes that it takes.
+            /// Size, bytes.
             pub fn size(self) -> usize {
                 match self {
                     $(Self::$Scalar => size_of::<$type>(),)*

@@ -1,6 +1,5 @@
-//! A folder from which somebody else chooses scans, recordings and tables of points, and to which
-//! they are added: nothing outside of it is listed, read or written, and nothing in it is written
-//! over.
+//! A folder from which a user chooses scans, recordings and tables of points, and adds them:
+//! nothing outside of it is listed, read or written, and nothing in it is overwritten.
 
 use std::fs::{self, File};
 use std::io::{self, Write};
@@ -15,22 +14,22 @@ use super::mesh_file::SCAN_EXTENSIONS;
 use super::recording::{is_of_recording, own_files};
 use super::session_folder::is_plain_name;
 
-/// Recordings that are one file, by extension.
+/// Single-file recordings, by extension.
 const RECORDING_EXTENSIONS: &[&str] = &["mcap", "db3"];
 /// Tables of points.
 const TABLE_EXTENSIONS: &[&str] = &["csv"];
-/// Files in a list at most: the newest.
+/// Maximum number of files in a list: the newest.
 const MOST_LISTED: usize = 500;
-/// Files of a folder that are looked at, at most, to see whether it is a recording.
+/// Maximum number of files in the check for a recording folder.
 const MOST_LOOKED_AT: usize = 1000;
-/// Bytes of a name at most, as file systems have it, with room for a number.
+/// Maximum length of a name, bytes: the limit of file systems, with room for a number.
 const LONGEST_NAME: usize = 200;
-/// Files of one name at most.
+/// Maximum number of files of one name.
 const MOST_OF_A_NAME: u32 = 1000;
-/// How the temporary name of an upload begins.
+/// Start of an upload's temporary name.
 const UPLOAD_STEM: &str = ".upload.";
 
-/// What a file is taken for, by its extension.
+/// Kind of a file, by its extension.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FolderFileKind {
     /// a mesh or a point cloud
@@ -57,28 +56,28 @@ impl FolderFileKind {
     }
 }
 
-/// A file that can be chosen, or a folder that is one recording.
+/// A selectable file, or a folder that is one recording.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct FolderFile {
     /// without a folder
     pub name: String,
     /// its length, or that of all files in the folder
     pub bytes: u64,
-    /// when it was changed, or a file was added to the folder or taken away, s since 1970 UTC;
-    /// `None` where the system does not say
+    /// last change, for a folder the last added or removed file, s since 1970 UTC; `None` if
+    /// unknown to the system
     pub modified_s: Option<u64>,
 }
 
-/// Why a file is not taken.
+/// Why a file is refused.
 #[derive(Debug, thiserror::Error)]
 pub enum ScanFolderError {
-    /// It could lead out of the folder, or is none.
+    /// A name that could lead out of the folder, or no name.
     #[error("\"{0}\" is not a plain name of a file: give one without folders, such as scan.ply")]
     NotAPlainName(String),
-    /// Its extension says that it is something else.
+    /// An extension of another kind than a scan.
     #[error("\"{0}\" is no scan by its name: it must end in one of {known}", known = SCAN_EXTENSIONS.join(", "))]
     NotAScan(String),
-    /// Its extension says that it is something else.
+    /// An extension of another kind than a recording or table.
     #[error(
         "\"{0}\" is neither a recording nor a table of points by its name: it must end in one of {known}, {tables}",
         known = RECORDING_EXTENSIONS.join(", "),
@@ -90,15 +89,15 @@ pub enum ScanFolderError {
         "\"{0}\" is no whole recording of rosbag2: metadata.yaml must name files that lie in it, and none of them may be a link"
     )]
     NotABag(String),
-    /// There is none of that name, or it is a link or a folder.
+    /// A missing file, a link or a folder.
     #[error("there is no file \"{0}\" in the folder of scans: look at the list again")]
     NotThere(String),
-    /// More came than is taken.
+    /// Excess size.
     #[error(
         "the file is larger than {0} bytes: make a scan coarser, a recording shorter, or copy it into the folder of scans"
     )]
     TooLarge(u64),
-    /// What the system says.
+    /// A system error.
     #[error("the folder of scans cannot be used: {0}")]
     System(#[from] io::Error),
 }
@@ -110,10 +109,10 @@ pub struct ScanFolder {
 }
 
 impl ScanFolder {
-    /// - `path`: of a folder that is there.
+    /// - `path`: an existing folder.
     ///
     /// # Errors
-    /// Whatever the system reports, and a path to something else.
+    /// Any system error, and a path to something else.
     pub fn open(path: &Path) -> io::Result<Self> {
         let path = fs::canonicalize(path)?;
         match path.is_dir() {
@@ -125,20 +124,20 @@ impl ScanFolder {
         }
     }
 
-    /// Where it is.
+    /// Path of the folder.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// The plain files of a kind that lie in it, the newest first, and of recordings the folders
-    /// too; links are left out.
+    /// The plain files of a kind in it, the newest first, and for recordings the folders too; links
+    /// are left out.
     ///
     /// # Errors
-    /// Whatever the system reports of the folder.
+    /// Any system error about the folder.
     pub fn list(&self, kind: FolderFileKind) -> io::Result<Vec<FolderFile>> {
         let mut found = Vec::new();
         for entry in fs::read_dir(&self.path)? {
-            // a file that goes meanwhile is not there
+            // a file removed meanwhile is left out
             let Ok((name, about)) =
                 entry.and_then(|entry| Ok((entry.file_name(), entry.metadata()?)))
             else {
@@ -174,10 +173,10 @@ impl ScanFolder {
         Ok(found)
     }
 
-    /// The place of a file that somebody chose.
+    /// The place of a file chosen by the user.
     ///
     /// # Errors
-    /// [`ScanFolderError`] for whatever is no plain file of that kind in the folder.
+    /// [`ScanFolderError`] for anything but a plain file of that kind in the folder.
     pub fn file(&self, name: &str, kind: FolderFileKind) -> Result<PathBuf, ScanFolderError> {
         if !is_plain_name(name) {
             return Err(ScanFolderError::NotAPlainName(name.to_owned()));
@@ -196,7 +195,7 @@ impl ScanFolder {
         }
     }
 
-    /// The place of a plain file of that name, where there is one.
+    /// The place of a plain file of that name, if there is one.
     pub fn plain_file(&self, name: &str) -> Option<PathBuf> {
         let path = self.path.join(name);
         let is_there =
@@ -204,7 +203,7 @@ impl ScanFolder {
         is_there.then_some(path)
     }
 
-    /// A place where nothing is: that of `stem.extension`, or with a number.
+    /// An unused place: `stem.extension`, or with a number.
     pub fn free_place(&self, stem: &str, extension: &str) -> PathBuf {
         let named = |number| match number {
             1 => self.path.join(format!("{stem}.{extension}")),
@@ -216,11 +215,11 @@ impl ScanFolder {
         free.unwrap_or_else(|| self.path.join(format!("{stem}.{extension}")))
     }
 
-    /// Begins a new file, which is there when it is whole.
+    /// Begins a new file, which appears when it is whole.
     ///
-    /// - `name`: as its owner calls it; what a file's name had better not have becomes `_`.
-    /// - `is_scan`: whether it has to be a scan by its name, or else a recording or a table.
-    /// - `most`: bytes at most.
+    /// - `name`: the owner's name; unsuitable characters become `_`.
+    /// - `is_scan`: requires the extension of a scan, or else of a recording or a table.
+    /// - `most`: maximum number of bytes.
     ///
     /// # Errors
     /// [`ScanFolderError`]
@@ -249,7 +248,7 @@ impl ScanFolder {
     }
 }
 
-/// Length of all files in a folder that looks like a recording of rosbag2; `None`: it does not.
+/// Length of all files in a folder that looks like a recording of rosbag2; `None` for others.
 fn bag_bytes(folder: &Path) -> Option<u64> {
     let (mut bytes, mut is_recording) = (0, false);
     for entry in fs::read_dir(folder).ok()?.flatten().take(MOST_LOOKED_AT) {
@@ -262,7 +261,7 @@ fn bag_bytes(folder: &Path) -> Option<u64> {
     is_recording.then_some(bytes)
 }
 
-/// A name as the folder has it.
+/// A name in the folder's form.
 fn cleaned(name: &str, is_scan: bool) -> Result<String, ScanFolderError> {
     if !is_plain_name(name) || name.len() > LONGEST_NAME {
         return Err(ScanFolderError::NotAPlainName(
@@ -281,20 +280,20 @@ fn cleaned(name: &str, is_scan: bool) -> Result<String, ScanFolderError> {
         .collect())
 }
 
-/// A file on its way; dropped before it is whole, nothing is left of it.
+/// An upload in progress; drop before its end removes it.
 #[derive(Debug)]
 pub struct ScanUpload {
     folder: PathBuf,
     name: String,
     file: File,
-    /// removes the file when it is dropped
+    /// removes the file on drop
     temporary: TempPath,
     bytes: u64,
     most: u64,
 }
 
 impl ScanUpload {
-    /// Adds what came.
+    /// Adds a piece.
     ///
     /// # Errors
     /// [`ScanFolderError::TooLarge`], [`ScanFolderError::System`].
@@ -306,10 +305,10 @@ impl ScanUpload {
         Ok(self.file.write_all(piece)?)
     }
 
-    /// Gives the file its name, or that with a number where it is taken: the name.
+    /// Gives the file its name, with a number if it is taken, and returns it.
     ///
     /// # Errors
-    /// [`ScanFolderError::System`]; nothing is left then.
+    /// [`ScanFolderError::System`]; nothing remains then.
     pub fn commit(self) -> Result<String, ScanFolderError> {
         let Self {
             folder,
@@ -490,7 +489,7 @@ mod tests {
             bag
         };
         make("whole", "bag_0.mcap");
-        // as early versions of rosbag2 name them
+        // names of early versions of rosbag2
         make("early", "early/bag_0.mcap");
         for (name, listed) in [
             ("up", "../outside.mcap"),

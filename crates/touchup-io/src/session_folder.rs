@@ -7,10 +7,10 @@ use std::path::{Component, Path, PathBuf};
 use super::atomic::write_atomically;
 use super::file_error::open_up_to;
 
-/// Longest file of lines that is read: a million strokes.
+/// Longest file of lines for reading: a million strokes.
 const MOST_BYTES: u64 = 64 << 20;
 
-/// Why a name was refused as one of a file in the folder.
+/// Why a name is refused for a file in the folder.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PlaceError {
     /// Absolute, with folders in it, or none at all.
@@ -18,15 +18,15 @@ pub enum PlaceError {
         "\"{0}\" is not the name of a file in the session's folder: give a plain name such as refined.ply"
     )]
     NotAPlainName(String),
-    /// There is something of that name that is no file, as a link.
+    /// An existing entry that is no file, such as a link.
     #[error("\"{0}\" is there and is no plain file: choose another name")]
     NotAFile(String),
-    /// There is a file of that name.
+    /// An existing file.
     #[error("\"{0}\" is there already: choose another name, or set overwrite")]
     Taken(String),
 }
 
-/// A folder that this process made.
+/// A folder made by this process.
 #[derive(Clone, Debug)]
 pub struct SessionFolder {
     path: PathBuf,
@@ -34,10 +34,10 @@ pub struct SessionFolder {
 }
 
 impl SessionFolder {
-    /// Makes a folder `name` in `parent`, or `name-2` and so on where that is taken.
+    /// Makes a folder `name` in `parent`, or `name-2` and so on for a taken name.
     ///
     /// # Errors
-    /// Whatever the system reports.
+    /// Any system error.
     pub fn create(parent: &Path, name: &str) -> io::Result<Self> {
         fs::create_dir_all(parent)?;
         let parent = fs::canonicalize(parent)?;
@@ -57,10 +57,10 @@ impl SessionFolder {
         Err(io::Error::from(io::ErrorKind::AlreadyExists))
     }
 
-    /// One that is there, which somebody else named.
+    /// An existing one, by a name from outside.
     ///
     /// # Errors
-    /// Whatever the system reports, and names that could lead elsewhere.
+    /// Any system error, and names that could lead elsewhere.
     pub fn open(parent: &Path, name: &str) -> io::Result<Self> {
         let path = parent.join(name);
         // a link may lead anywhere
@@ -76,7 +76,7 @@ impl SessionFolder {
         })
     }
 
-    /// Where it is.
+    /// Path of the folder.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -89,16 +89,16 @@ impl SessionFolder {
     /// Makes a folder in it.
     ///
     /// # Errors
-    /// Whatever the system reports.
+    /// Any system error.
     pub fn create_folder(&self, name: &str) -> io::Result<PathBuf> {
         let path = self.path.join(name);
         fs::create_dir(&path).map(|()| path)
     }
 
-    /// The place of a file that somebody else named.
+    /// The place of a file, by a name from outside.
     ///
     /// # Errors
-    /// [`PlaceError`] for whatever could lead out of the folder, and for a file that is there
+    /// [`PlaceError`] for any name that could lead out of the folder, and for an existing file
     /// unless it may be replaced.
     pub fn place(&self, name: &str, may_replace: bool) -> Result<PathBuf, PlaceError> {
         if !is_plain_name(name) {
@@ -115,15 +115,15 @@ impl SessionFolder {
     /// Writes a text file as a whole.
     ///
     /// # Errors
-    /// Whatever the system reports.
+    /// Any system error.
     pub fn write_text(&self, name: &str, text: &str) -> io::Result<()> {
         write_text_file(&self.path.join(name), text)
     }
 
-    /// Adds a line to a file, and has it on the disk.
+    /// Adds a line to a file, and syncs it to the disk.
     ///
     /// # Errors
-    /// Whatever the system reports.
+    /// Any system error.
     pub fn append_line(&self, name: &str, line: &str) -> io::Result<()> {
         let mut file = OpenOptions::new()
             .create(true)
@@ -134,29 +134,27 @@ impl SessionFolder {
     }
 }
 
-/// What the folders of files that are handed in begin with: hidden, so that nobody lists or reads
-/// them.
+/// Prefix of upload folders: hidden, so that nobody lists or reads them.
 const HANDED_IN: &str = ".upload-";
 
-/// A file that somebody hands in piece by piece: in a hidden folder of a session, for as long as
-/// this is.
+/// An upload in pieces, in a hidden folder of a session, until drop.
 #[derive(Debug)]
 pub struct HandedIn {
     file: File,
     path: PathBuf,
     room: u64,
-    /// removes both when it is dropped
+    /// removes both on drop
     _folder: tempfile::TempDir,
 }
 
 impl HandedIn {
-    /// An empty one; what a process that was killed has left there goes.
+    /// An empty upload; removes the remains of killed processes.
     ///
-    /// - `name`: as it is called where it comes from.
-    /// - `most`: bytes that it may have.
+    /// - `name`: name at its source.
+    /// - `most`: maximum number of bytes.
     ///
     /// # Errors
-    /// Whatever the system reports, and names that could lead elsewhere.
+    /// Any system error, and names that could lead elsewhere.
     pub fn new(session: &SessionFolder, name: &str, most: u64) -> io::Result<Self> {
         if !is_plain_name(name) {
             return Err(io::Error::new(
@@ -186,7 +184,7 @@ impl HandedIn {
     /// Adds a piece.
     ///
     /// # Errors
-    /// Whatever the system reports; [`io::ErrorKind::FileTooLarge`] for more than it may have.
+    /// Any system error; [`io::ErrorKind::FileTooLarge`] beyond the maximum size.
     pub fn add(&mut self, piece: &[u8]) -> io::Result<()> {
         let left = self.room.checked_sub(piece.len() as u64);
         self.room = left
@@ -194,13 +192,13 @@ impl HandedIn {
         self.file.write_all(piece)
     }
 
-    /// Where it is.
+    /// Path of the upload.
     pub fn path(&self) -> &Path {
         &self.path
     }
 }
 
-/// A session that lies in a folder of sessions.
+/// A session in a folder of sessions.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ListedSession {
     /// of its folder
@@ -211,14 +209,13 @@ pub struct ListedSession {
     pub files: Vec<String>,
 }
 
-/// Sessions in a list at most: the last by name, which are the newest.
+/// Maximum number of sessions in a list: the last by name, which are the newest.
 const MOST_LISTED: usize = 1000;
 
-/// The sessions in a folder, the newest first; links and what has a name of another form are left
-/// out.
+/// The sessions in a folder, the newest first; links and names of another form are left out.
 ///
 /// # Errors
-/// Whatever the system reports.
+/// Any system error.
 pub fn list_sessions(parent: &Path) -> io::Result<Vec<ListedSession>> {
     let mut names = Vec::new();
     for entry in fs::read_dir(parent)? {
@@ -238,8 +235,7 @@ pub fn list_sessions(parent: &Path) -> io::Result<Vec<ListedSession>> {
     listed.collect()
 }
 
-/// `None` for what went while it was looked at, as a file that is written beside another and then
-/// takes its place.
+/// `None` for a vanished entry, such as a temporary file that took another one's place meanwhile.
 fn still_there<T>(found: io::Result<T>) -> io::Result<Option<T>> {
     match found {
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
@@ -268,10 +264,10 @@ fn listed(parent: &Path, name: String) -> io::Result<ListedSession> {
     Ok(session)
 }
 
-/// A file of a session that somebody else named, and its length.
+/// A file of a session, by a name from outside, and its length.
 ///
 /// # Errors
-/// Whatever the system reports, and names that could lead elsewhere.
+/// Any system error, and names that could lead elsewhere.
 pub fn open_file(parent: &Path, session: &str, file: &str) -> io::Result<(File, u64)> {
     if !is_plain_name(session) || !is_plain_name(file) {
         return Err(io::Error::new(
@@ -306,15 +302,15 @@ pub(super) fn is_plain_name(name: &str) -> bool {
 /// Writes a text file as a whole.
 ///
 /// # Errors
-/// Whatever the system reports.
+/// Any system error.
 pub fn write_text_file(path: &Path, text: &str) -> io::Result<()> {
     write_atomically(path, |out| out.write_all(text.as_bytes()))
 }
 
-/// The text of a file that is not absurdly long; empty where there is none.
+/// The text of a file of sensible length; empty for a missing file.
 ///
 /// # Errors
-/// Whatever the system reports, and a file that is too long or no text.
+/// Any system error, and a file that is too long or no text.
 pub fn read_text(path: &Path) -> io::Result<String> {
     let file = match File::open(path) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(String::new()),
@@ -327,13 +323,13 @@ pub fn read_text(path: &Path) -> io::Result<String> {
     Ok(text)
 }
 
-/// A path that holds wherever the process is started from, and the checksum of what is there.
+/// A path independent of the working directory, and the checksum of its file.
 ///
 /// # Errors
-/// Whatever the system reports.
+/// Any system error.
 pub fn fingerprint(path: &Path) -> io::Result<(PathBuf, u32)> {
     let (mut file, mut crc, mut buffer) = (
-        // that has an end, however far
+        // without a size limit for a regular file
         open_up_to(path, u64::MAX - 1)?,
         crc32fast::Hasher::new(),
         vec![0; 1 << 16],

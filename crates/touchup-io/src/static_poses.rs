@@ -1,8 +1,7 @@
 //! Static poses of a force sensor, as comma-separated values.
 //!
 //! `qx,qy,qz,qw,fx_n,fy_n,fz_n,tx_nm,ty_nm,tz_nm`: orientation of the stylus in the frame of the
-//! poses, and the wrench as measured. Each line is one pose at rest. How tables are written:
-//! [`super::table`].
+//! poses, and the measured wrench. Each line is one pose at rest. Form of tables: [`super::table`].
 
 use std::fs::File;
 use std::io::{self, Write};
@@ -16,7 +15,7 @@ use touchup_core::stylus::Wrench;
 const COLUMNS: [&str; 10] = [
     "qx", "qy", "qz", "qw", "fx_n", "fy_n", "fz_n", "tx_nm", "ty_nm", "tz_nm",
 ];
-/// A quaternion may be off from 1 by this: components printed with three digits.
+/// Maximum deviation of a quaternion's length from 1: components printed with three digits.
 const UNIT_TOLERANCE: f64 = 1e-2;
 
 /// Reads orientations and wrenches, N and N·m.
@@ -58,7 +57,7 @@ fn pose(row: &Row) -> Result<(UnitQuaternion<f64>, Wrench), String> {
     Ok((UnitQuaternion::from_quaternion(quaternion), wrench))
 }
 
-/// A file of static poses that grows while they are measured; [`read_static_poses`] reads it.
+/// A growing file of static poses during measurement; [`read_static_poses`] reads it.
 #[derive(Debug)]
 pub struct StaticPoseLog {
     path: PathBuf,
@@ -69,7 +68,7 @@ impl StaticPoseLog {
     /// Begins a file, in place of an older one.
     ///
     /// # Errors
-    /// Of the file.
+    /// Any error of the file.
     pub fn create(path: &Path) -> io::Result<Self> {
         let mut file = File::create(path)?;
         writeln!(file, "{}", COLUMNS.join(","))?;
@@ -82,13 +81,13 @@ impl StaticPoseLog {
     /// Appends a pose, which is on the disk when this returns.
     ///
     /// # Errors
-    /// Of the file.
+    /// Any error of the file.
     pub fn append(&mut self, rotation: &UnitQuaternion<f64>, wrench: &Wrench) -> io::Result<()> {
         writeln!(self.file, "{}", static_pose_line(rotation, wrench))?;
         self.file.sync_data()
     }
 
-    /// Where it is.
+    /// Path of the file.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -129,7 +128,7 @@ mod tests {
         }
         let read = read_static_poses(&path).unwrap();
         for ((rotation, wrench), expected) in read.iter().zip([0.1, 0.2].map(pose)) {
-            // its length is made 1 again
+            // reading normalises its length to 1
             assert!(
                 rotation.angle_to(&expected.0) < 1e-15 && *wrench == expected.1,
                 "{rotation} {wrench:?}"

@@ -11,17 +11,17 @@ const MAX_BYTES: u64 = 16 << 20;
 /// Why a table is refused.
 #[derive(Debug, thiserror::Error)]
 pub enum TableError {
-    /// It cannot be read.
+    /// A failed read.
     #[error(transparent)]
     Io(#[from] FileError),
-    /// A line that is wrong.
+    /// A faulty line.
     #[error("{}, line {line}: {why}", path.display())]
     Line {
-        /// which file
+        /// the file
         path: PathBuf,
         /// from 1 on
         line: usize,
-        /// what is wrong, and what to do
+        /// the fault, and the remedy
         why: String,
     },
 }
@@ -29,28 +29,28 @@ pub enum TableError {
 /// The columns of a table.
 #[derive(Clone, Copy)]
 pub(super) struct WantedColumns<'a> {
-    /// numbers that must be there
+    /// required numbers
     pub needed: &'a [&'a str],
-    /// numbers that may be there
+    /// optional numbers
     pub numbers: &'a [&'a str],
-    /// texts that may be there
+    /// optional texts
     pub texts: &'a [&'a str],
 }
 
-/// One row, its columns in the order asked for.
+/// One row, its columns in the requested order.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Row {
-    /// where it begins
+    /// its first line
     pub line: usize,
     /// finite
     pub needed: Vec<f64>,
-    /// `None` if it is empty, or the column is not there
+    /// `None` for an empty value, or a missing column
     pub numbers: Vec<Option<f64>>,
     /// likewise
     pub texts: Vec<Option<String>>,
 }
 
-/// All rows that have a value.
+/// All rows with a value.
 pub(super) fn read_table(path: &Path, columns: WantedColumns<'_>) -> Result<Vec<Row>, TableError> {
     let bytes = read_up_to(path, MAX_BYTES).map_err(|source| FileError::Read {
         path: path.to_owned(),
@@ -63,7 +63,7 @@ pub(super) fn read_table(path: &Path, columns: WantedColumns<'_>) -> Result<Vec<
     })
 }
 
-/// `Err`: the line, and what is wrong in it.
+/// `Err`: the line, and its fault.
 fn parse(bytes: &[u8], columns: WantedColumns<'_>) -> Result<Vec<Row>, (usize, String)> {
     let wrong = |error: RowError, line| (line, error.to_string());
     let mut rows = TableRows::open(bytes).map_err(|error| wrong(error, 1))?;
@@ -80,7 +80,7 @@ fn parse(bytes: &[u8], columns: WantedColumns<'_>) -> Result<Vec<Row>, (usize, S
         match rows.advance() {
             Err(error) => return Err(wrong(error, rows.line())),
             Ok(false) => return Ok(found),
-            // spreadsheets save rows that were emptied
+            // spreadsheets save emptied rows
             Ok(true) if rows.values().iter().all(|value| value.is_empty()) => {}
             Ok(true) => {
                 let mut sign = rows.sign;
@@ -93,7 +93,7 @@ fn parse(bytes: &[u8], columns: WantedColumns<'_>) -> Result<Vec<Row>, (usize, S
     }
 }
 
-/// Each column is known and there once, and none is missing.
+/// Checks that each column is known and unique, and that none is missing.
 fn check_names(names: &[String], columns: WantedColumns<'_>) -> Result<(), String> {
     let needed = columns.needed;
     let more = [columns.texts, columns.numbers].concat();

@@ -1,16 +1,16 @@
-//! Tables of text, row after row, as spreadsheets write them: values in quotation marks if they
+//! Tables of text, row after row, in the forms of spreadsheets: values in quotation marks if they
 //! hold a separator or a line end (RFC 4180), with a byte order mark, with either end of line.
 //!
-//! Values are separated by semicolons, tabs, commas or blanks, whichever the first row has outside
-//! of quotation marks. Empty lines and lines that begin with `#` are passed over. What separates and
-//! the decimal sign are those of the whole file: where commas separate decimals have a point.
+//! The separator is the first of semicolon, tab, comma and blank that the first row has outside of
+//! quotation marks. Empty lines and lines that begin with `#` are skipped. Separator and decimal
+//! sign hold for the whole file: between commas decimals have a point.
 
 use std::borrow::Cow;
 use std::io::{self, BufRead, Read};
 
 use csv_core::{ReadRecordResult, Reader, ReaderBuilder, Terminator};
 
-/// Longest row: hundreds of columns. A quotation mark that is never closed ends there.
+/// Longest row: hundreds of columns. An unclosed quotation mark ends there.
 pub(crate) const MAX_ROW_BYTES: usize = 64 << 10;
 
 /// The fault of a row.
@@ -31,14 +31,14 @@ pub(crate) enum RowError {
 /// The rows of a table, one after another.
 pub(crate) struct TableRows<R> {
     input: R,
-    /// of the values, if they are not separated by blanks
+    /// of the values, unless blanks separate them
     parser: Option<Reader>,
     line: Vec<u8>,
     /// lines read
     at: usize,
-    /// where the row begins, from 1 on
+    /// first line of the row, from 1
     first: usize,
-    /// values one after another, and where each ends
+    /// concatenated values, and their ends
     text: Vec<u8>,
     ends: Vec<usize>,
     width: usize,
@@ -75,7 +75,7 @@ impl<R: BufRead> TableRows<R> {
         Ok(rows)
     }
 
-    /// Reads the next row; `false` at the end. After an error of one row the next can be read.
+    /// Reads the next row; `false` at the end. Reading may continue after an error of one row.
     pub fn advance(&mut self) -> Result<bool, RowError> {
         self.width = 0;
         let is_there = self.next_line(false, MAX_ROW_BYTES)?;
@@ -97,7 +97,7 @@ impl<R: BufRead> TableRows<R> {
         value.collect()
     }
 
-    /// Where the last row begins, from 1 on.
+    /// First line of the last row, from 1.
     pub fn line(&self) -> usize {
         self.first
     }
@@ -131,7 +131,7 @@ impl<R: BufRead> TableRows<R> {
         }
     }
 
-    /// Takes the values of the line apart, and of those after it that belong to the same row.
+    /// Splits the line into values, together with further lines of the same row.
     fn take_row(&mut self) -> Result<(), RowError> {
         let Some(mut parser) = self.parser.take() else {
             self.take_words();
@@ -205,7 +205,7 @@ fn separator_of(row: &[u8]) -> Option<u8> {
 pub(crate) struct DecimalSign(pub Option<char>);
 
 impl DecimalSign {
-    /// A number with a decimal point; `None` if it has another sign than those before.
+    /// A number with a decimal point; `None` for another sign than before.
     pub fn with_point<'a>(&mut self, number: &'a str) -> Option<Cow<'a, str>> {
         match number
             .find([',', '.'])

@@ -11,7 +11,7 @@ const MAX_TEXT_BYTES: u64 = 64 << 20;
 /// A text of not more than 64 MiB.
 ///
 /// # Errors
-/// [`FileError::Read`], also where it is no UTF-8.
+/// [`FileError::Read`], also for invalid UTF-8.
 pub fn read_text(path: &Path) -> Result<String, FileError> {
     let no_text = |error| io::Error::new(io::ErrorKind::InvalidData, error);
     let text = read_up_to(path, MAX_TEXT_BYTES)

@@ -12,11 +12,11 @@ use touchup_core::stylus::ProbedPoint;
 
 /// The first line of a file of touches.
 ///
-/// `touch`: its number, from 0 on, which features name; `stamp_ns`: of the sample it came from;
-/// `stroke`; the centre of the ball and its radius (0 where the tip is none); the point of the
-/// surface and its outward normal; the standard deviations along the normal of what averages out,
-/// of what radius and stiffness leave and of the place of the scan; what it counts; whether it was
-/// rejected as an outlier.
+/// `touch`: its number, from 0 on, which features name; `stamp_ns`: of its sample; `stroke`; the
+/// centre of the ball and its radius (0 for other tips); the point of the surface and its outward
+/// normal; the standard deviations along the normal of averaging errors, of the calibration of
+/// radius and stiffness, and of the place of the scan; its weight; whether it was rejected as an
+/// outlier.
 pub const HEADER: &str = "touch,stamp_ns,stroke,center_x_mm,center_y_mm,center_z_mm,tip_radius_mm,point_x_mm,point_y_mm,\
                           point_z_mm,normal_x,normal_y,normal_z,sigma_mm,calibration_mm,place_mm,weight,\
                           rejected";
@@ -24,7 +24,7 @@ pub const HEADER: &str = "touch,stamp_ns,stroke,center_x_mm,center_y_mm,center_z
 /// Why a file of touches could not be read.
 #[derive(Debug, thiserror::Error)]
 pub enum TouchesFileError {
-    /// The system refused.
+    /// A system error.
     #[error(transparent)]
     File(#[from] FileError),
     /// Another header.
@@ -40,7 +40,7 @@ pub enum TouchesFileError {
         path: PathBuf,
         /// from 1 on
         line: usize,
-        /// what is wrong
+        /// the fault
         what: String,
     },
 }
@@ -59,8 +59,8 @@ pub fn write_touches(path: &Path, touches: &[ProbedPoint]) -> Result<(), FileErr
     })
 }
 
-/// Touches as [`read_touches`] has them after [`write_touches`]: to the digits written. What is
-/// measured by them can be measured again from the file.
+/// Touches after [`write_touches`] and [`read_touches`]: to the digits written. Measurements on
+/// them are reproducible from the file.
 pub fn as_written(touches: &[ProbedPoint]) -> Vec<ProbedPoint> {
     let rounded =
         |(number, touch)| touch_of(&values_of(&line_of(touch, number)), number).unwrap_or(*touch);
@@ -97,7 +97,7 @@ pub(crate) fn line_of(touch: &ProbedPoint, number: usize) -> String {
     )
 }
 
-/// Reads what [`write_touches`] wrote, also as spreadsheets save it.
+/// Reads a file of [`write_touches`], also as spreadsheets save it.
 ///
 /// # Errors
 /// [`TouchesFileError`], with the line.
@@ -105,7 +105,7 @@ pub fn read_touches(path: &Path) -> Result<Vec<ProbedPoint>, TouchesFileError> {
     read_rows(path, |_| ())
 }
 
-/// Reads touches, and gives the values of each as they are in the file, with decimal points.
+/// Reads touches, with the values of each as in the file, with decimal points.
 pub(crate) fn read_rows(
     path: &Path,
     mut row_read: impl FnMut(&[Cow<'_, str>]),
@@ -148,7 +148,7 @@ pub(crate) fn read_rows(
     }
 }
 
-/// Touches come in order of time, and all within a span that ns can count.
+/// Requires touches in order of time, within a span that ns can count.
 fn in_order(before: &[ProbedPoint], touch: ProbedPoint) -> Result<ProbedPoint, String> {
     let (Some(first), Some(last)) = (before.first(), before.last()) else {
         return Ok(touch);

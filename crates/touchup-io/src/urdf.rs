@@ -1,8 +1,8 @@
-//! The joints and links of an arm, from the URDF that describes it.
+//! The joints and links of an arm, from its URDF.
 //!
-//! Read are joints (origin, axis, limits) from a base to a flange, and of links the shapes that
-//! they collide with. Poses are T = (xyz, Rz(yaw) Ry(pitch) Rx(roll)), in m and rad, of a joint in
-//! the frame of its parent link.
+//! Used are joints (origin, axis, limits) from a base to a flange, and the collision shapes of
+//! links. Poses are T = (xyz, Rz(yaw) Ry(pitch) Rx(roll)), in m and rad, of a joint in the frame of
+//! its parent link.
 
 use std::fs::File;
 use std::io::Read;
@@ -13,42 +13,42 @@ use nalgebra::{Isometry3, Point3, UnitQuaternion, UnitVector3, Vector3};
 use roxmltree::{Document, Node};
 use touchup_core::probing::arm::{Capsule, ChainError, ChainJoint, ChainLink, SerialChain};
 
-/// A description of an arm is smaller than this, bytes.
+/// Maximum size of an arm's description, bytes.
 const LARGEST: u64 = 16 << 20;
 
-/// What is wanted of a URDF.
+/// Links of interest in a URDF.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ArmLinks<'a> {
     /// name of the link whose frame is the base B
     pub base: &'a str,
     /// name of the link whose frame is the flange F
     pub flange: &'a str,
-    /// of links that have no simple shape, m
+    /// of links without a simple shape, m
     pub radius: f64,
 }
 
 /// Why a URDF is no arm.
 #[derive(Debug, thiserror::Error)]
 pub enum UrdfError {
-    /// It cannot be read.
+    /// A failed read.
     #[error("cannot read the URDF {path}: {source}", path = path.display())]
     Read {
-        /// which file
+        /// the file
         path: PathBuf,
-        /// what the system says
+        /// the system's error
         source: std::io::Error,
     },
-    /// It is no URDF of an arm.
+    /// Not a URDF of an arm.
     #[error("{path}: {error}", path = path.display())]
     In {
-        /// which file
+        /// the file
         path: PathBuf,
-        /// what is wrong in it
+        /// the fault
         error: DescriptionError,
     },
 }
 
-/// What is wrong in a URDF.
+/// A fault of a URDF.
 #[derive(Debug, thiserror::Error)]
 pub enum DescriptionError {
     /// Too large, or no text.
@@ -57,37 +57,37 @@ pub enum DescriptionError {
     /// No XML.
     #[error("{0}")]
     Xml(#[from] roxmltree::Error),
-    /// A macro has to be expanded first.
+    /// An unexpanded macro.
     #[error("it is written for xacro: expand it first, `xacro {0} > arm.urdf`")]
     Xacro(String),
-    /// There is no such link.
+    /// A missing link.
     #[error("there is no link `{name}`; there are {known}")]
     NoLink {
-        /// which
+        /// its name
         name: String,
         /// all of them
         known: String,
     },
-    /// The flange is no part of what stands on the base.
+    /// The flange does not stand on the base.
     #[error(
         "from the link `{flange}` no joints lead down to the link `{base}`: they end at `{end}`"
     )]
     NotConnected {
-        /// from where
+        /// start of the chain
         flange: String,
-        /// where to
+        /// its required end
         base: String,
-        /// as far as they go
+        /// its actual end
         end: String,
     },
-    /// What is not supported, or not there.
+    /// An unsupported or missing part.
     #[error("joint `{joint}`, line {line}: {what}")]
     Joint {
-        /// which
+        /// name of the joint
         joint: String,
         /// of the file, from 1 on
         line: u32,
-        /// what is wrong
+        /// the fault
         what: String,
     },
     /// Joints and links that are no arm.
@@ -159,7 +159,7 @@ fn chain_of(text: &str, name: &str, links: &ArmLinks<'_>) -> Result<SerialChain,
     let (mut way, mut at) = (Vec::new(), links.flange);
     while at != links.base {
         let is_below = |joint: &Node<'_, '_>| linked(joint, "child") == Some(at);
-        // a link is the child of one joint: who goes round in a circle has met all of them
+        // a link is the child of one joint: a circular walk meets all of them
         let below = robot
             .children()
             .filter(named("joint"))
@@ -192,7 +192,7 @@ fn chain_of(text: &str, name: &str, links: &ArmLinks<'_>) -> Result<SerialChain,
     Ok(SerialChain::new(joints, chain_links, pose, links.radius)?)
 }
 
-/// Joints between base and flange, with those that are fixed, at most.
+/// Maximum number of joints between base and flange, including fixed ones.
 const MOST_JOINTS: usize = 256;
 
 fn linked<'a>(joint: &Node<'a, '_>, tag: &str) -> Option<&'a str> {
@@ -212,7 +212,7 @@ fn fault(joint: &Node<'_, '_>, what: impl Into<String>) -> DescriptionError {
     }
 }
 
-/// Numbers of an attribute; `None` where it is there and is something else.
+/// Numbers of an attribute; `None` for an attribute of another form.
 fn numbers<const N: usize>(
     node: Option<Node<'_, '_>>,
     key: &str,
@@ -248,7 +248,7 @@ fn origin(joint: &Node<'_, '_>) -> Result<Isometry3<f64>, DescriptionError> {
     })
 }
 
-/// A joint that turns; `None` for a fixed one.
+/// A turning joint; `None` for a fixed one.
 fn turning(
     joint: &Node<'_, '_>,
     origin: Isometry3<f64>,
@@ -296,8 +296,7 @@ fn turning(
     }))
 }
 
-/// The capsule around the shape that a link collides with, in its frame, where it has a single one
-/// that is no mesh.
+/// The capsule around a link's collision shape, in its frame, if the shape is single and no mesh.
 fn body(link: Node<'_, '_>) -> Option<Capsule> {
     let mut shapes = link
         .children()
@@ -336,8 +335,8 @@ mod tests {
     use super::*;
     use touchup_core::probing::arm::UrGeometry;
 
-    /// A UR5e as its driver describes it, in ROS's frames: joints about z, each where the one
-    /// before ends.
+    /// A UR5e as its driver describes it, in ROS's frames: joints about z, each at the end of the
+    /// one before.
     const UR5E: &str = r#"<robot name="ur5e">
         <link name="base_link"/><link name="base"/><link name="l1"/><link name="l2"><collision>
           <origin xyz="-0.2 0 0.138" rpy="0 1.5707963267948966 0"/><geometry><cylinder radius="0.06" length="0.4"/></geometry>

@@ -1,17 +1,16 @@
-//! How the mesh in a file looks: colours of its vertices, texture coordinates of the corners of its
-//! faces.
+//! Appearance of a mesh file: colours of vertices, texture coordinates of face corners.
 
 use std::path::{Path, PathBuf};
 
 use nalgebra::Point3;
 use touchup_core::mesh::{Appearance, MeshError, Texture, TriMesh, VertexColours, is_place};
 
-/// Triangles as a file has them, and how they look.
+/// Triangles of a file, with their appearance.
 #[derive(Debug, Default)]
 pub(super) struct PaintedSoup {
     pub positions: Vec<Point3<f64>>,
     pub faces: Vec<[u32; 3]>,
-    /// as many as there are positions
+    /// one per position
     pub colours: Option<VertexColours>,
     pub texture: Option<SoupTexture>,
 }
@@ -21,15 +20,15 @@ pub(super) struct PaintedSoup {
 pub(super) struct SoupTexture {
     /// of the three corners of each triangle
     pub corners: Vec<[[f32; 2]; 3]>,
-    /// which image each triangle shows
+    /// image index of each triangle
     pub shown: Vec<u32>,
     /// as the file names them
     pub images: Vec<String>,
 }
 
 impl PaintedSoup {
-    /// Of a file in `folder`. Faces without a place or an area, and vertices that no other face
-    /// uses, show nothing.
+    /// Appearance for a file in `folder`. Drops faces without finite positions or an area, and
+    /// unused vertices.
     pub fn appearance(self, folder: &Path) -> Result<Appearance, MeshError> {
         let soup = self;
         let corners = |face: &[u32; 3]| {
@@ -77,8 +76,8 @@ impl PaintedSoup {
 }
 
 impl SoupTexture {
-    /// Of the faces that `mesh` has, in their order, for a file in `folder`: an image in or below
-    /// it is named by the way from there, any other from the root.
+    /// Texture of the faces of `mesh`, in their order, for a file in `folder`: paths of images in
+    /// or below it are relative, others absolute.
     pub fn of(texture: &Texture, mesh: &TriMesh, folder: &Path) -> Self {
         let absolute = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
         let folder = absolute(folder);

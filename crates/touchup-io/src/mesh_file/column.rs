@@ -7,12 +7,12 @@ use touchup_core::mesh::VertexColours;
 pub struct VertexColumn {
     /// name of the property, with its unit
     pub name: &'static str,
-    /// as many as the mesh has vertices
+    /// one per vertex of the mesh
     pub values: ColumnValues,
 }
 
 impl VertexColumn {
-    /// A column for each colour, named as most programs name them.
+    /// A column for each colour, by the usual names.
     pub fn of_colours(colours: VertexColours) -> Vec<Self> {
         fn columns<const N: usize>(of: &[[u8; N]]) -> Vec<VertexColumn> {
             let column = |(at, name)| VertexColumn {
@@ -36,7 +36,7 @@ impl VertexColumn {
 pub enum ColumnValues {
     /// `float`
     Single(Vec<f32>),
-    /// `uchar`, as colours are
+    /// `uchar`, as for colours
     Byte(Vec<u8>),
 }
 

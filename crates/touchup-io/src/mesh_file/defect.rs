@@ -1,4 +1,4 @@
-//! What can be wrong inside a mesh file, and where.
+//! Defects inside a mesh file, and their places.
 
 use std::fmt;
 
@@ -7,10 +7,10 @@ use crate::file_error::FilePlace;
 /// The defect.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Defect {
-    /// The field has another value.
+    /// An unexpected value of a field.
     #[error("expected {expected}, found {found}")]
     Unexpected {
-        /// what could have been read
+        /// allowed values
         expected: &'static str,
         /// the text found, shortened
         found: String,
@@ -21,30 +21,30 @@ pub enum Defect {
         if *needed > *left as u128 { "the file is damaged or cut short" } else { "the count or the end is wrong" }
     )]
     Length {
-        /// what is counted
+        /// counted item
         what: String,
-        /// how many there should be
+        /// announced number
         count: u64,
-        /// bytes they take at least
+        /// minimum size of them, bytes
         needed: u128,
-        /// bytes there are
+        /// available bytes
         left: usize,
     },
-    /// A vertex number that names no vertex.
+    /// A number of a missing vertex.
     #[error("a face uses vertex {vertex}, but there are only {vertices} vertices")]
     NoSuchVertex {
         /// as written in the file
         vertex: i64,
-        /// how many there are
+        /// number of vertices
         vertices: usize,
     },
-    /// A polygon that is none.
+    /// A polygon with crossing sides.
     #[error("the sides of a polygon cross: export the mesh in triangles")]
     SidesCross,
-    /// A file of points without one.
+    /// An empty point file.
     #[error("no point in it: export it again with x, y and z of each point")]
     NoPoints,
-    /// What the reader of E57 files says.
+    /// An error of the E57 reader.
     #[error("the E57 file is damaged or of a kind not known here ({reason}): export it again")]
     E57 {
         /// in its own words
@@ -84,7 +84,7 @@ impl Syntax {
         }
     }
 
-    /// The file ends here.
+    /// A premature end of the file.
     pub fn ends(place: FilePlace, expected: &'static str) -> Self {
         Self {
             place,

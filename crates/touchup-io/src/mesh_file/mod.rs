@@ -30,7 +30,7 @@ use touchup_core::mesh::{
 };
 pub use unit::{Implausible, LARGEST_M, MeshUnit, SMALLEST_M};
 
-/// Extensions of the files that hold a scan, in lower case: meshes, then point clouds.
+/// Extensions of scan files, in lower case: meshes, then point clouds.
 pub const SCAN_EXTENSIONS: &[&str] = &["ply", "stl", "obj", "pcd", "xyz", "txt", "asc", "e57"];
 
 /// Why a mesh file could not be read or written.
@@ -39,7 +39,7 @@ pub enum MeshFileError {
     /// An input or output error.
     #[error(transparent)]
     File(#[from] FileError),
-    /// Neither the name nor the content is known.
+    /// Unknown name and content.
     #[error("{}: not a kind of mesh or point cloud known here: convert it to .ply, .stl, .obj, .pcd, .xyz or .e57", path.display())]
     UnknownFormat {
         /// the file
@@ -50,9 +50,9 @@ pub enum MeshFileError {
     Syntax {
         /// the file
         path: PathBuf,
-        /// where
+        /// place of the defect
         place: FilePlace,
-        /// what
+        /// defect
         defect: Defect,
     },
     /// Points without a surface.
@@ -60,10 +60,10 @@ pub enum MeshFileError {
     NoFaces {
         /// the file
         path: PathBuf,
-        /// how many points
+        /// number of points
         vertices: usize,
     },
-    /// E57 has a unit, and another one was named.
+    /// A unit other than the metre of E57.
     #[error("{}: an E57 file is in metres by its standard, not in {unit}: --mesh-unit m", path.display())]
     UnitOfE57 {
         /// the file
@@ -79,25 +79,25 @@ pub enum MeshFileError {
         /// why
         source: MeshError,
     },
-    /// A mesh with a vertex that is nowhere is not written.
+    /// A vertex without a finite position, which prevents writing.
     #[error("{}: not written: vertex {vertex} has a coordinate that is not a number within {FARTHEST:e} m", path.display())]
     NoPlace {
         /// the file
         path: PathBuf,
-        /// which vertex, counted from 0
+        /// index of the vertex, from 0
         vertex: u32,
     },
-    /// The unit cannot be right.
+    /// An implausible unit.
     #[error("{}: {size}", path.display())]
     Implausible {
         /// the file
         path: PathBuf,
-        /// the size and what it suggests
+        /// the size, and a plausible unit
         size: Implausible,
     },
 }
 
-/// A mesh as read, and what had to be repaired.
+/// A mesh as read, and its repairs.
 #[derive(Clone, Debug)]
 pub struct MeshFile {
     /// vertices in m, in the file's own frame, which becomes O
@@ -124,7 +124,7 @@ impl Format {
         }
     }
 
-    /// From the content of the file, where it is unambiguous.
+    /// Format by unambiguous content.
     fn of_content(bytes: &[u8]) -> Option<Self> {
         match bytes {
             [b'p', b'l', b'y', b'\r' | b'\n', ..] => Some(Self::Ply),
@@ -134,24 +134,24 @@ impl Format {
     }
 }
 
-/// What a file holds.
+/// Content of a scan file.
 #[derive(Clone, Debug)]
 pub enum MeshOrPoints {
     /// triangles, repaired
     Mesh(Box<MeshFile>),
-    /// points alone, as they are in the file, also those without a place
+    /// points alone, as in the file, including non-finite ones
     Points(PointCloud),
 }
 
 /// Reads a PLY, STL or OBJ file and repairs it ([`repair`]).
 ///
-/// The content decides about the format where it is unmistakable, the extension otherwise.
+/// Unmistakable content decides the format, else the extension.
 ///
 /// - `unit`: the unit of the coordinates in the file; the mesh comes out in m.
 ///
 /// # Errors
-/// [`MeshFileError`]: one line that names the file, the place in it, and what to do; a point cloud
-/// is one.
+/// [`MeshFileError`]: one line that names the file, the place in it, and the remedy; also for a
+/// point cloud.
 pub fn read_mesh(path: &Path, unit: MeshUnit) -> Result<MeshFile, MeshFileError> {
     match read_mesh_or_points(path, unit)? {
         MeshOrPoints::Mesh(file) => Ok(*file),
@@ -223,7 +223,7 @@ pub fn read_mesh_or_points(path: &Path, unit: MeshUnit) -> Result<MeshOrPoints, 
     Ok(MeshOrPoints::Mesh(Box::new(file)))
 }
 
-/// How the mesh in a PLY or OBJ file looks; `None` where nothing is said of it, and for files of
+/// Appearance of the mesh in a PLY or OBJ file; `None` without colours or texture, and for files of
 /// other kinds.
 ///
 /// - `unit`: of the coordinates in the file.
@@ -231,7 +231,7 @@ pub fn read_mesh_or_points(path: &Path, unit: MeshUnit) -> Result<MeshOrPoints, 
 /// # Errors
 /// [`MeshFileError::File`], [`MeshFileError::Syntax`], [`MeshFileError::Mesh`].
 pub fn read_appearance(path: &Path, unit: MeshUnit) -> Result<Option<Appearance>, MeshFileError> {
-    // a pipe cannot be read twice
+    // a pipe allows one read only
     if !path.is_file() {
         return Ok(None);
     }
@@ -258,9 +258,9 @@ pub fn read_appearance(path: &Path, unit: MeshUnit) -> Result<Option<Appearance>
         })
 }
 
-/// The mesh of what `path` holds, repaired ([`repair`]).
+/// The repaired mesh ([`repair`]) of the file `path`.
 ///
-/// - `unit`: of the file, for what is said of a size that cannot be right; `positions`: m.
+/// - `unit`: of the file, for the error about an implausible size; `positions`: m.
 ///
 /// # Errors
 /// [`MeshFileError::Mesh`], [`MeshFileError::Implausible`].
@@ -282,7 +282,7 @@ pub fn repaired(
     Ok(MeshFile { mesh, repair })
 }
 
-/// The format of a file that holds nothing but points.
+/// The format of a file of points alone.
 fn cloud_format(bytes: &[u8], path: &Path) -> Option<CloudFormat> {
     let of_name = || CloudFormat::of_extension(path.extension()?.to_ascii_lowercase().to_str()?);
     match Format::of_content(bytes) {
@@ -291,8 +291,8 @@ fn cloud_format(bytes: &[u8], path: &Path) -> Option<CloudFormat> {
     }
 }
 
-/// The scalar properties `names` of the vertices of a PLY file, as far as it has them, for each
-/// vertex of the `mesh` that [`read_mesh`] makes of it; nothing of a file of another kind.
+/// The available scalar properties `names` of the vertices of a PLY file, for each vertex of the
+/// `mesh` that [`read_mesh`] makes of it; none for other kinds of files.
 ///
 /// - `mesh`: of that file, in `unit`.
 /// - returns: for each name the numbers by vertex id, or `None`.
@@ -316,15 +316,14 @@ pub fn read_vertex_columns<const N: usize>(
     };
     let (positions, columns) = ply::read_columns(&bytes, unit.metres(), names).map_err(syntax)?;
     let rows = rows_of(mesh, &positions);
-    // of a surface made through points no vertex is in the file
+    // a surface reconstructed from points has vertices missing from the file
     if rows.len() < mesh.positions().len() {
         return Ok([const { None }; N]);
     }
     Ok(columns.map(|column| column.map(|values| rows.iter().map(|&row| values[row]).collect())))
 }
 
-/// For each vertex the row of the file that it comes from: repair keeps the order, and of equal
-/// positions the first.
+/// For each vertex its row in the file: repair keeps the order, and the first of equal positions.
 fn rows_of(mesh: &TriMesh, positions: &[Point3<f64>]) -> Vec<usize> {
     let mut rows = positions.iter().enumerate();
     let mut row_of = |wanted: &Point3<f64>| {
@@ -363,9 +362,9 @@ pub fn write_mesh(path: &Path, mesh: &TriMesh, unit: MeshUnit) -> Result<(), Mes
     write_mesh_with(path, mesh, &[], None, unit)
 }
 
-/// [`write_mesh`] with `columns` and `texture`: PLY has a place for all of it, OBJ for the texture
-/// and colours (`red`, `green`, `blue`), STL for nothing. Images stay where they are; those of an
-/// OBJ are named in a file of the same name that ends in `.mtl`.
+/// [`write_mesh`] with `columns` and `texture`: PLY stores all of it, OBJ the texture and colours
+/// (`red`, `green`, `blue`), STL nothing. Images stay in place; for an OBJ a file of the same name
+/// with the ending `.mtl` names them.
 ///
 /// # Errors
 /// As [`write_mesh`].

@@ -18,9 +18,8 @@ use super::soup::{Soup, divided};
 use super::text::NumberedLines;
 use crate::file_error::FilePlace;
 
-/// Reads all objects and groups as one mesh; coordinates are multiplied by `scale`. Lines, points,
-/// normals, texture and materials are passed over. Vertices come in the order in which faces first
-/// name them.
+/// Reads all objects and groups as one mesh, with coordinates times `scale`. Skips lines, points,
+/// normals, texture and materials. Vertices come in order of first use by a face.
 pub(super) fn read(bytes: &[u8], scale: f64) -> Result<Soup, Syntax> {
     let bytes = joined(as_utf8(bytes)?);
     let mut lines = Lines::new(&bytes, false);
@@ -35,10 +34,10 @@ pub(super) fn read(bytes: &[u8], scale: f64) -> Result<Soup, Syntax> {
     Ok(soup)
 }
 
-/// The triangles as [`read`] has them, and how they look; what materials say is read from `folder`.
+/// The triangles of [`read`] with their appearance; material files come from `folder`.
 ///
-/// Colours count where each vertex has one: three numbers from 0 to 1 after its coordinates. A file
-/// with neither colours nor texture coordinates is not parsed: nothing comes of it.
+/// Colours count if each vertex has one: three numbers from 0 to 1 after its coordinates. A file
+/// with neither colours nor texture coordinates is not parsed.
 pub(super) fn read_painted(bytes: &[u8], scale: f64, folder: &Path) -> Result<PaintedSoup, Syntax> {
     let bytes = joined(as_utf8(bytes)?);
     let mut lines = Lines::new(&bytes, true);
@@ -46,7 +45,7 @@ pub(super) fn read_painted(bytes: &[u8], scale: f64, folder: &Path) -> Result<Pa
     if !lines.has_colours && !has_texture_coordinates(&bytes) {
         return Ok(PaintedSoup::default());
     }
-    // a file of materials that is not there, or damaged, names no image
+    // a missing or damaged material file names no image
     let materials = |name: &Path| {
         let file = File::open(folder.join(name)).map_err(|_| LoadError::OpenFileFailed)?;
         tobj::load_mtl_buf(&mut BufReader::new(file))
@@ -57,7 +56,7 @@ pub(super) fn read_painted(bytes: &[u8], scale: f64, folder: &Path) -> Result<Pa
     let mut image_of = vec![None; materials.len()];
     for model in &models {
         let mesh = &model.mesh;
-        // [0, 0] where a corner has none
+        // [0, 0] for a corner without coordinates
         let of = |corner: usize| {
             let number = mesh.texcoord_indices.get(corner).copied();
             let coordinates = mesh.texcoords.as_chunks::<2>().0;
@@ -117,8 +116,8 @@ fn load(
     Ok((models, materials.unwrap_or_default()))
 }
 
-/// Adds the triangles of a model; of each `corners` gets the numbers of its three corners in the
-/// model. The error is the number of a face whose sides cross.
+/// Adds the triangles of a model; `corners` gets the indices of each one's three corners in the
+/// model. The error is the number of a face with crossing sides.
 fn take(
     model: &Model,
     scale: f64,
@@ -133,7 +132,7 @@ fn take(
         faces.push(of_model.map(|at| mesh.indices[at] + first as u32));
         corners(of_model);
     };
-    // triangles alone have no list of how many corners each face has
+    // pure triangles have no list of face sizes
     if mesh.face_arities.is_empty() {
         (0..mesh.indices.len() / 3).for_each(|face| add([0, 1, 2].map(|at| 3 * face + at)));
     }
@@ -149,7 +148,7 @@ fn take(
     Ok(())
 }
 
-/// The sides of a face cross: where it is among those with three corners and more.
+/// Crossing sides of a face, by its number among faces with three corners and more.
 fn crossing(bytes: &[u8], face: usize) -> Syntax {
     let mut lines = NumberedLines::new(bytes, b'\n');
     let numbers = std::iter::from_fn(|| {
@@ -165,7 +164,7 @@ fn crossing(bytes: &[u8], face: usize) -> Syntax {
     }
 }
 
-/// The text as UTF-8: UTF-16 with a byte order mark is turned into it. Comments may be in any
+/// The text as UTF-8, converted from UTF-16 with a byte order mark. Comments may be in any
 /// encoding.
 fn as_utf8(bytes: &[u8]) -> Result<Cow<'_, [u8]>, Syntax> {
     let pair: fn([u8; 2]) -> u16 = match bytes {
@@ -189,7 +188,7 @@ fn as_utf8(bytes: &[u8]) -> Result<Cow<'_, [u8]>, Syntax> {
     Ok(Cow::Owned(text.map_err(broken)?.into_bytes()))
 }
 
-/// With lines that end with a backslash joined to the next; the numbers of those that follow stay.
+/// Joins lines that end with a backslash to the next; later lines keep their numbers.
 fn joined(bytes: Cow<'_, [u8]>) -> Cow<'_, [u8]> {
     let goes_on = |line: &[u8]| line.trim_ascii_end().ends_with(b"\\");
     let lines = || bytes.split_inclusive(|&b| b == b'\n');
@@ -211,18 +210,18 @@ fn joined(bytes: Cow<'_, [u8]>) -> Cow<'_, [u8]> {
     Cow::Owned(text)
 }
 
-/// Passes on the lines that make the mesh, `v` without colours and `f`, or also what says how it
-/// looks, and counts.
+/// Passes on the lines of the mesh, `v` without colours and `f`, or also those of its appearance,
+/// and counts.
 struct Lines<'a> {
     rest: &'a [u8],
-    /// `vt`, `mtllib` and `usemtl` too
+    /// passes on `vt`, `mtllib` and `usemtl` too
     is_painted: bool,
-    /// … and colours
+    /// passes on colours too
     has_colours: bool,
     line: &'a [u8],
     /// the end of the line was cut off with its colour
     shortened: bool,
-    /// number of the line handed on last, counted from 1
+    /// number of the last line passed on, from 1
     number: usize,
     vertices: usize,
 }
@@ -308,8 +307,8 @@ fn has_texture_coordinates(bytes: &[u8]) -> bool {
         .any(|line| matches!(line.trim_ascii_start(), [b'v', b't', b' ' | b'\t', ..]))
 }
 
-/// The line up to the third coordinate when more than a weight follows: files in which only some
-/// vertices have a colour would be refused.
+/// The line up to the third coordinate if more than a weight follows: `tobj` refuses files with
+/// colours on only some vertices.
 fn without_colour(line: &[u8]) -> &[u8] {
     let (mut words, mut end, mut in_word) = (0, line.len(), false);
     for (at, byte) in line.iter().enumerate() {
@@ -323,8 +322,7 @@ fn without_colour(line: &[u8]) -> &[u8] {
     if words > 5 { &line[..end] } else { line }
 }
 
-/// Where and what: errors in the use of vertices are found only at the end, when `tobj` has lost
-/// the line.
+/// Place and defect: `tobj` reports vertex errors only at the end, without the line.
 fn place_of(error: LoadError, bytes: &[u8], number: usize) -> Syntax {
     let of_faces = matches!(
         error,
@@ -350,7 +348,7 @@ fn place_of(error: LoadError, bytes: &[u8], number: usize) -> Syntax {
     })
 }
 
-/// The first face without corners or with a corner that names no vertex.
+/// The first face without corners or with a missing vertex.
 fn first_bad_face(bytes: &[u8]) -> Option<Syntax> {
     let total = bytes
         .split(|&b| b == b'\n')
@@ -387,7 +385,7 @@ fn first_bad_face(bytes: &[u8]) -> Option<Syntax> {
 /// OBJ with the fewest digits that read back as the same number, at most 17; with the colours among
 /// `columns`, by `ids` of the vertices.
 ///
-/// - `materials`: name of the file of materials, where images are known.
+/// - `materials`: name of the material file, if there are images.
 pub(super) fn write(
     soup: &Soup,
     ids: &[usize],

@@ -11,15 +11,15 @@ use crate::file_error::FilePlace;
 pub(super) struct Soup {
     pub positions: Vec<Point3<f64>>,
     pub faces: Vec<[u32; 3]>,
-    /// vertices in the file that did not even get into `positions`
+    /// vertices of the file missing from `positions`
     pub unused: usize,
 }
 
-/// Polygons as read from a file, before the vertices may have been.
+/// Polygons as read from a file, possibly before the vertices.
 #[derive(Debug, Default)]
 pub(super) struct Polygons {
     vertices: Vec<u32>,
-    /// where those of each end, and its place in the file
+    /// end of each one's vertices, and its place in the file
     ends: Vec<(usize, FilePlace)>,
 }
 
@@ -36,8 +36,8 @@ impl Polygons {
         Ok(())
     }
 
-    /// Divides each in turn: the number of the polygon, its vertices, and of each triangle which
-    /// three of these it has.
+    /// Divides each in turn: the number of the polygon, its vertices, and for each triangle the
+    /// indices of its three.
     pub fn divide(
         &self,
         positions: &[Point3<f64>],
@@ -60,8 +60,8 @@ impl Polygons {
     }
 }
 
-/// The triangles of a polygon, as indices into its vertices; `None` where its sides cross. Of one
-/// whose vertices are not there the numbers alone are divided: what reads them refuses it.
+/// The triangles of a polygon, as indices into its vertices; `None` for crossing sides. A polygon
+/// with missing vertices is divided by numbers alone; a later check refuses it.
 pub(super) fn divided(vertices: &[u32], positions: &[Point3<f64>]) -> Option<Vec<[u32; 3]>> {
     let at = |&vertex: &u32| positions.get(vertex as usize).copied();
     let nowhere = || vec![Point3::origin(); vertices.len()];
@@ -83,8 +83,8 @@ impl Soup {
         }
     }
 
-    /// Faces that are there and the vertices they use, coordinates divided by `scale`; and the ids
-    /// of these vertices.
+    /// Existing faces and their vertices, coordinates divided by `scale`; and the ids of these
+    /// vertices.
     pub fn used_part(mesh: &TriMesh, scale: f64) -> (Self, Vec<usize>) {
         let mut renamed = vec![u32::MAX; mesh.vertex_slots()];
         mesh.faces()

@@ -21,7 +21,7 @@ pub(super) fn is_binary(bytes: &[u8]) -> bool {
         .is_some_and(|count| bytes.len() as u64 == HEADER as u64 + RECORD as u64 * u64::from(count))
 }
 
-/// Whether the text begins as ASCII STL does; the headers of some binary files do so as well.
+/// Whether the text begins like ASCII STL; so do the headers of some binary files.
 pub(super) fn looks_ascii(bytes: &[u8]) -> bool {
     /// The first facet comes right after the solid's name.
     const SEARCHED: usize = 1024;
@@ -79,8 +79,7 @@ fn read_binary(bytes: &[u8], scale: f64) -> Result<Soup, Syntax> {
     Ok(Soup::of_triangles(positions))
 }
 
-/// Any number of solids; words in any case; facets of more than three corners are divided into
-/// triangles.
+/// Any number of solids; words in any case; larger facets are divided into triangles.
 fn read_ascii(bytes: &[u8], scale: f64) -> Result<Soup, Syntax> {
     let mut positions: Vec<Point3<f64>> = Vec::new();
     let mut corners: Vec<Point3<f64>> = Vec::new();
@@ -135,7 +134,7 @@ fn read_ascii(bytes: &[u8], scale: f64) -> Result<Soup, Syntax> {
     }
 }
 
-/// Binary STL; the corners are rounded to `f32`, as the format has it.
+/// Binary STL; the format rounds the corners to `f32`.
 pub(super) fn write(soup: &Soup, unit: &str, out: &mut impl Write) -> io::Result<()> {
     let mut header = [b' '; 80];
     // must not begin with "solid"

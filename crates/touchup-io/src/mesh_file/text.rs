@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use super::defect::Syntax;
 use crate::file_error::FilePlace;
 
-/// The lines of a file with their numbers; bytes that are no UTF-8 are shown as such.
+/// The lines of a file with their numbers; invalid UTF-8 is replaced by a mark.
 pub(super) struct NumberedLines<'a> {
     bytes: &'a [u8],
     end_of_line: u8,
@@ -36,12 +36,12 @@ impl<'a> NumberedLines<'a> {
         Some(String::from_utf8_lossy(rest[..len].trim_ascii()))
     }
 
-    /// Number of the line that came last, counted from 1.
+    /// Number of the last line, from 1.
     pub fn number(&self) -> usize {
         self.number
     }
 
-    /// Where the next line begins, or the end of the file.
+    /// Start of the next line, or the end of the file.
     pub fn offset(&self) -> usize {
         self.at.min(self.bytes.len())
     }

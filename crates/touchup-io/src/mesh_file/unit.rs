@@ -1,4 +1,4 @@
-//! Mesh files carry no unit: the user names it, and a size that no work-piece has is refused.
+//! Units of mesh files, which carry none: the user names it, and implausible sizes are refused.
 
 use std::fmt;
 
@@ -7,8 +7,8 @@ use serde::Serialize;
 
 use touchup_core::words;
 
-/// Smallest diagonal of the bounding box: below it lies nothing that a ball tip of about a
-/// millimetre could touch.
+/// Smallest diagonal of the bounding box: smaller parts offer nothing to a ball tip of about a
+/// millimetre.
 pub const SMALLEST_M: f64 = 1e-3;
 
 /// Largest diagonal of the bounding box: beyond the reach of any arm, while a car body or an
@@ -16,8 +16,7 @@ pub const SMALLEST_M: f64 = 1e-3;
 pub const LARGEST_M: f64 = 20.0;
 
 words! {
-    /// The unit in which a mesh file gives its coordinates; the commonest first, as they are
-    /// suggested.
+    /// The unit of a mesh file's coordinates; the commonest first, in the order of suggestion.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum, Serialize)]
     pub enum MeshUnit {
         /// 1 m
@@ -48,14 +47,14 @@ impl MeshUnit {
     }
 }
 
-/// A size that no work-piece has, in the unit it was said to be in.
+/// An implausible size of a workpiece, in its stated unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Implausible {
     /// sides of the bounding box, in `unit`
     pub sides: Vector3<f64>,
     /// the unit named by the user
     pub unit: MeshUnit,
-    /// a unit in which the size is plausible
+    /// a unit that makes the size plausible
     pub suggestion: Option<MeshUnit>,
 }
 

@@ -1,4 +1,4 @@
-//! What can be wrong with a file of nominal values.
+//! Faults of a file of nominal values.
 
 use std::path::PathBuf;
 
@@ -8,13 +8,13 @@ use crate::table::TableError;
 /// Why a file of nominal values is refused.
 #[derive(Debug, thiserror::Error)]
 pub enum NominalFileError {
-    /// It could not be read or written.
+    /// A failed read or write.
     #[error(transparent)]
     File(#[from] FileError),
-    /// It is no table.
+    /// An invalid table.
     #[error("{0}")]
     Table(#[from] TableError),
-    /// It is no JSON, or has another form.
+    /// Invalid JSON, or another form.
     #[error("{} is no file of nominal values: {source}; see docs/inspect.md", path.display())]
     Json {
         /// the file
@@ -22,17 +22,17 @@ pub enum NominalFileError {
         /// why, with line and column
         source: serde_json::Error,
     },
-    /// A characteristic that is wrong.
+    /// An invalid characteristic.
     #[error("{}, {place}: {why}", path.display())]
     Characteristic {
         /// the file
         path: PathBuf,
         /// line of a table, or number of a characteristic
         place: String,
-        /// what is wrong, and what to do
+        /// the fault, and the remedy
         why: String,
     },
-    /// Nothing is in it.
+    /// An empty file.
     #[error("{}: it has no characteristic: add one line for each, or begin with touchup inspect … --write-nominal", .0.display())]
     Empty(PathBuf),
 }

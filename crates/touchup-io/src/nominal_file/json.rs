@@ -1,4 +1,4 @@
-//! … as JSON.
+//! Nominal values as JSON.
 
 use std::io::Write;
 use std::path::Path;

@@ -1,5 +1,5 @@
-//! Nominal values and tolerances of a part, as a drawing has them: CSV or JSON; lengths in mm,
-//! angles in degrees, in the frame of the mesh.
+//! Nominal values and tolerances of a part, as on a drawing: CSV or JSON; lengths in mm, angles in
+//! degrees, in the frame of the mesh.
 
 mod error;
 mod json;
@@ -12,7 +12,7 @@ use std::path::Path;
 pub use error::NominalFileError;
 pub use record::{DatumRecord, NominalRecord, NominalTolerance};
 
-/// Whether a file is read as nominal values; else it is a mesh.
+/// Whether a file holds nominal values; else it is a mesh.
 pub fn is_nominal_file(path: &Path) -> bool {
     let ending = path.extension().map(|ending| ending.to_ascii_lowercase());
     ending.is_some_and(|ending| ending == "csv" || ending == "json")
@@ -21,7 +21,7 @@ pub fn is_nominal_file(path: &Path) -> bool {
 /// Reads nominal values: `.json`, else a table.
 ///
 /// # Errors
-/// [`NominalFileError`]: the first that is wrong, with its line.
+/// [`NominalFileError`]: the first fault, with its line.
 pub fn read_nominal(path: &Path) -> Result<Vec<NominalRecord>, NominalFileError> {
     let is_json = path
         .extension()

@@ -6,27 +6,27 @@ use touchup_core::conformity::{InspectedQuantity, ToleranceLimits};
 use touchup_core::features::Kind;
 
 /// A nominal value and its tolerance; lengths in mm, angles in degrees, in the frame of the mesh.
-/// What is not said is left out.
+/// Unstated values are absent.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NominalRecord {
-    /// as the report has it; no two alike
+    /// unique name in the report
     pub name: String,
     /// of the feature: `hole`, `slot`, `pocket`, `boss`, `edge`, `corner`, `plane`, `cylinder`,
     /// `notch`
     pub kind: String,
-    /// what of it, with its unit: `diameter_mm`, …
+    /// inspected quantity, with its unit, such as `diameter_mm`
     pub quantity: String,
-    /// nominal value of a length; 0 of a zone
+    /// nominal value of a length; 0 for a zone
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub nominal_mm: Option<f64>,
     /// nominal value of an angle
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub nominal_deg: Option<f64>,
-    /// tolerance ± about the nominal value; of a zone its width or diameter. Of an angle in degrees
+    /// tolerance ± about the nominal value; for a zone its width or diameter
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tolerance_mm: Option<f64>,
-    /// … of an angle
+    /// tolerance ± of an angle
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tolerance_deg: Option<f64>,
     /// lower limit deviation from the nominal value, mostly negative, in place of a tolerance ±;
@@ -36,23 +36,23 @@ pub struct NominalRecord {
     /// upper limit deviation
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub upper_deviation_mm: Option<f64>,
-    /// … of an angle
+    /// lower limit deviation of an angle
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lower_deviation_deg: Option<f64>,
-    /// … of an angle
+    /// upper limit deviation of an angle
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub upper_deviation_deg: Option<f64>,
-    /// nominal centre of the feature, by which it is found
+    /// nominal centre of the feature, which identifies it
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub center_mm: Option<[f64; 3]>,
-    /// nominal axis, of a plane its outward normal: by it and the centre drawing and part are
-    /// aligned. Of any length
+    /// nominal axis, for a plane its outward normal, of any length: it and the centre align drawing
+    /// and part
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub axis: Option<[f64; 3]>,
     /// its `id` in the file of features, in place of the centre
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub feature: Option<u32>,
-    /// the feature that it relates to
+    /// datum feature
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub datum: Option<DatumRecord>,
 }
@@ -71,27 +71,27 @@ pub struct DatumRecord {
     pub feature: Option<u32>,
 }
 
-/// What a file says of the tolerance of a characteristic.
+/// Tolerance of a characteristic in a file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum NominalTolerance {
     /// limits of the characteristic itself, mm or degrees
     Limits(ToleranceLimits),
-    /// none: a general tolerance has to apply
+    /// none: a general tolerance applies
     General,
 }
 
 impl NominalRecord {
-    /// The quantity, once it was checked.
+    /// The quantity, after the check.
     pub fn quantity(&self) -> Option<InspectedQuantity> {
         InspectedQuantity::of_name(&self.quantity)
     }
 
-    /// The kind of the feature, once it was checked.
+    /// The kind of the feature, after the check.
     pub fn kind(&self) -> Option<Kind> {
         Kind::of_name(&self.kind)
     }
 
-    /// Nominal value, mm or degrees; 0 of a zone.
+    /// Nominal value, mm or degrees; 0 for a zone.
     pub fn nominal(&self) -> f64 {
         self.nominal_mm.or(self.nominal_deg).unwrap_or(0.0)
     }
@@ -117,7 +117,7 @@ impl NominalRecord {
         }
     }
 
-    /// Whether both are of the same feature: its kind, and its place or number.
+    /// Whether both belong to the same feature: its kind, and its place or number.
     pub fn is_of_the_same_feature(&self, other: &Self) -> bool {
         self.kind == other.kind
             && self.feature == other.feature
@@ -131,7 +131,7 @@ impl NominalRecord {
             && self.datum == other.datum
     }
 
-    /// What is wrong with it, and what to do.
+    /// The fault, and the remedy.
     pub(super) fn check(&self) -> Result<(), String> {
         let Self {
             name,
@@ -268,7 +268,7 @@ impl NominalRecord {
 }
 
 impl DatumRecord {
-    /// The kind of the feature, once it was checked.
+    /// The kind of the feature, after the check.
     pub fn kind(&self) -> Option<Kind> {
         Kind::of_name(&self.kind)
     }

@@ -1,4 +1,4 @@
-//! … as a table.
+//! Nominal values as a table.
 
 use std::io::Write;
 use std::path::Path;
@@ -8,7 +8,7 @@ use super::record::{DatumRecord, NominalRecord};
 use crate::file_error::{FileError, write_file};
 use crate::table::{Row, TableError, WantedColumns, read_table};
 
-/// The columns, in any order; those without a value in any row may be left out.
+/// The columns, in any order; columns without a value in any row are optional.
 const COLUMNS: [&str; 23] = [
     "name",
     "kind",
@@ -35,10 +35,10 @@ const COLUMNS: [&str; 23] = [
     "datum_feature",
 ];
 
-/// Columns that must be there.
+/// Number of required columns.
 const NEEDED: usize = 3;
 
-/// Columns that are no numbers, or whole ones.
+/// Columns of texts or integers.
 const TEXTS: [&str; 6] = [
     "name",
     "kind",
@@ -142,7 +142,7 @@ pub(super) fn write(
         comment
             .iter()
             .try_for_each(|line| writeln!(out, "# {line}"))?;
-        // a name that begins as a comment does is put in quotation marks
+        // names that begin like a comment get quotation marks
         let mut rows_out = csv::WriterBuilder::new()
             .comment(Some(b'#'))
             .from_writer(out);

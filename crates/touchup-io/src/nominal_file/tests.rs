@@ -56,7 +56,7 @@ fn limits_have_the_decimals_of_the_drawing() {
     };
     let expected = ["a 6.07 6.17", "b 6.25 6.35", "c, (\"fit\") 0.905 1.105"];
     assert_eq!(limits(&text), expected);
-    // the same from a spreadsheet of a country where decimals have a comma
+    // the same from a spreadsheet with decimal commas
     let quoted = text.replace("c, (", "c| (").replace(',', ";");
     let other = quoted.replace(['.', '|'], ",");
     assert_eq!(
@@ -65,7 +65,7 @@ fn limits_have_the_decimals_of_the_drawing() {
     );
 }
 
-/// Rows with one mistake each, and a part of the message that it gets.
+/// Rows with one mistake each, and a part of its message.
 const MISTAKES: &[(&str, &str)] = &[
     (
         "a,hole,diameter_mm,NaN,0.1,,,,,",

@@ -1,8 +1,8 @@
 //! Reads ROS 1 bags, version 2.0, from the front, record by record [wiki.ros.org/Bags/Format/2.0].
 //!
-//! The framing is read here, not by the `rosbag` crate (0.6): that one maps the file into memory,
-//! so that a file cut meanwhile ends the program, and takes the memory that a chunk announces. Here
-//! each length is compared with what is there and with a limit first.
+//! The framing is read here, not by the `rosbag` crate (0.6), which maps the file into memory, so
+//! that a concurrent truncation ends the program, and allocates the announced size of a chunk. Here
+//! each length is compared with the available bytes and with a limit first.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -18,7 +18,7 @@ use super::{
     TopicInfo, TopicKind,
 };
 
-/// Topic and how it is read, place of the payload in the records, log time, ns.
+/// Topic and its format, place of the payload in the records, log time, ns.
 type FoundMessage = (TopicKind, MessageFormat, Range<usize>, i64);
 
 /// Messages of the topics of a touch of one bag, in the order of the file.
@@ -27,7 +27,7 @@ pub(super) struct BagReader {
     layout: RecordingLayout,
     stream: ByteStream,
     connections: Connections,
-    /// What the connections give that are read.
+    /// Content of the connections in use.
     read: BTreeMap<u32, (TopicKind, MessageFormat)>,
     header: Vec<u8>,
     packed: Vec<u8>,
@@ -42,9 +42,8 @@ pub(super) struct BagReader {
 }
 
 impl BagReader {
-    /// Opens a bag and learns which of the topics it has: from its index, or, where it has none, by
-    /// reading until all of them are described. Damage met on that search is returned beside the
-    /// reader.
+    /// Opens a bag and finds its topics: from its index, or, without one, by reading until all
+    /// topics are described. Damage in that search is returned beside the reader.
     pub fn open(
         path: &Path,
         layout: &RecordingLayout,
@@ -88,8 +87,8 @@ impl BagReader {
         Ok(reader)
     }
 
-    /// Takes over what is described elsewhere; a topic of a wrong type is an error of those who ask
-    /// for the topics.
+    /// Takes over descriptions found elsewhere; a topic of a wrong type is an error of the caller's
+    /// topic check.
     fn knows(&mut self, connections: Connections) {
         let read = connections.topics.iter();
         let read = read.filter_map(|(id, info)| {
@@ -243,7 +242,7 @@ impl RecordingFile for BagReader {
 fn unpack_chunk(head: &Head, packed: &[u8], records: &mut Vec<u8>) -> Result<(), Damage> {
     let announced = u64::from(head.size);
     check_length("unpacked chunk", announced)?;
-    // one byte more than announced shows that there is more
+    // one byte beyond the announced size reveals an excess
     let limit = announced + 1;
     match head.compression {
         b"none" => packed.take(limit).read_to_end(records)?,

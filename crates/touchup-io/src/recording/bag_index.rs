@@ -15,7 +15,7 @@ pub(super) const MAGIC: &[u8] = b"#ROSBAG V2.0\n";
 pub(super) const LENGTH_BYTES: u64 = 4;
 const NS_PER_S: i64 = 1_000_000_000;
 
-/// What a record is.
+/// Kinds of records.
 pub(super) mod op {
     pub const MESSAGE: u8 = 0x02;
     pub const CHUNK: u8 = 0x05;
@@ -23,18 +23,18 @@ pub(super) mod op {
     pub const CONNECTION: u8 = 0x07;
 }
 
-/// Fields of the header of a record that are used; 0 and nothing where they are not there.
+/// Fields in use of a record's header; 0 and empty if absent.
 #[derive(Default)]
 pub(super) struct Head<'a> {
     pub op: u8,
     pub connection: u32,
-    /// when the recorder took it
+    /// time of reception by the recorder
     pub time_ns: i64,
     pub topic: &'a [u8],
     pub compression: &'a [u8],
     /// of a chunk, unpacked
     pub size: u32,
-    /// of the bag: where the index begins
+    /// of the bag: start of the index
     index_at: u64,
     /// entries of a chunk's info
     count: u32,
@@ -81,14 +81,14 @@ fn named_fields(bytes: &[u8]) -> Result<Vec<NamedField<'_>>, Damage> {
     Ok(fields)
 }
 
-/// Connections met so far: a topic has one for each of its publishers.
+/// Connections up to now: a topic has one for each of its publishers.
 #[derive(Default)]
 pub(super) struct Connections {
     pub topics: BTreeMap<u32, TopicInfo>,
     name_bytes: NameBytes,
 }
 
-/// What a connection takes beside its names.
+/// Memory of a connection beside its names.
 const CONNECTION_BYTES: usize = 128;
 
 impl Connections {
@@ -138,8 +138,8 @@ pub(super) struct Index {
 }
 
 impl Index {
-    /// `None` when there is none, as in a bag whose recorder was killed: then the data are searched
-    /// instead.
+    /// `None` without an index, as in a bag of a killed recorder: then the reader searches the
+    /// data.
     pub fn read(path: &Path) -> Option<Self> {
         let mut file = File::open(path).ok()?;
         let size = file.metadata().ok()?.len();

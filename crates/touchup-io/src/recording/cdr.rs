@@ -1,5 +1,5 @@
-//! Poses, wrenches and clouds written as CDR (XCDR version 1), fields in the order of the `.msg`
-//! files, quaternions x, y, z, w; clouds are read by the same definitions.
+//! Poses, wrenches and clouds in CDR (XCDR version 1), fields in the order of the `.msg` files,
+//! quaternions x, y, z, w; the same definitions read clouds.
 
 use std::borrow::Cow;
 
@@ -10,7 +10,7 @@ use super::wire::MAX_MESSAGE_BYTES;
 use super::{BadMessage, RecordingError, ZSTD_MAGIC};
 use touchup_core::stylus::{StampedPose, StampedWrench};
 
-/// Serialized payloads are padded to four bytes by some middlewares; more left over is another
+/// Maximum padding of serialized payloads, to four bytes by some middlewares; more means another
 /// type.
 const MAX_PADDING_BYTES: usize = 3;
 const NS_PER_S: i64 = 1_000_000_000;
@@ -64,7 +64,7 @@ impl<'a> HeaderMsg<'a> {
     }
 }
 
-/// The payload itself, or what it unpacks to when rosbag2 compressed it as a single message.
+/// The payload, unpacked if rosbag2 compressed it as a single message.
 pub(super) fn unpack(payload: &[u8]) -> Result<Cow<'_, [u8]>, BadMessage> {
     if payload.starts_with(&ZSTD_MAGIC) {
         let plain = zstd::bulk::decompress(payload, MAX_MESSAGE_BYTES);

@@ -1,21 +1,21 @@
-//! Which columns of a table are time, pose and wrench, and in what units.
+//! Columns of a table for time, pose and wrench, and their units.
 //!
-//! A column's unit is in its header, as in `px_mm`, `px [mm]` or `px (mm)`; where the header has
-//! none the scene may name the column with it. Without names in the scene the usual ones are looked
-//! for, those of the RTDE logs of a UR first, whose units are known.
+//! A column's unit is in its header, as in `px_mm`, `px [mm]` or `px (mm)`; if the header has none,
+//! the scene may name the column with it. Without names in the scene the usual ones apply, first
+//! those of the RTDE logs of a UR, whose units are known.
 
 use touchup_core::{parameters, words};
 
 use super::units::{Quantity, split_unit};
 
 words! {
-    /// In whose axes the wrenches of a table are.
+    /// Axes of the wrenches of a table.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
     pub enum WrenchAxes {
-        /// Those of the positions: of the object, or of the base of an arm.
+        /// Axes of the positions: of the object, or of the base of an arm.
         #[default]
         Pose = "pose",
-        /// Those of the stylus, which the orientation turns.
+        /// Axes of the stylus, which the orientation turns.
         Tip = "tip",
     }
 }
@@ -42,14 +42,14 @@ parameters! {
     }
 }
 
-/// A column, and what its numbers are times to be in SI.
+/// A column, and the factor from its numbers to SI.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Column {
     pub at: usize,
     pub factor: f64,
 }
 
-/// How the orientation is given.
+/// Representation of the orientation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum OrientationColumns {
     /// x, y, z, w
@@ -58,7 +58,7 @@ pub(super) enum OrientationColumns {
     None,
 }
 
-/// The columns that are read.
+/// The columns in use.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct FoundColumns {
     pub time: Column,
@@ -69,8 +69,8 @@ pub(super) struct FoundColumns {
     pub wrench_axes: WrenchAxes,
 }
 
-/// Usual names, without unit and in lower case; the first group that is all there counts. Those of
-/// RTDE come with their unit, `{}` for their number.
+/// Usual names, without unit and in lower case; the first complete group counts. Names of RTDE come
+/// with their unit, `{}` for their number.
 struct UsualNames {
     of_rtde: &'static str,
     rtde_unit: &'static str,
@@ -132,10 +132,10 @@ const TORQUE: UsualNames = UsualNames {
 };
 
 impl TableColumns {
-    /// The columns of a table whose first line has these names.
+    /// The columns of a table with these names in its first line.
     ///
     /// # Errors
-    /// What is missing or has no unit, in words.
+    /// Missing columns or units, in words.
     pub(super) fn find(&self, header: &[String]) -> Result<FoundColumns, String> {
         let header = Header(header);
         let three = |key, named: &Option<Vec<String>>, quantity, usual| {
@@ -204,7 +204,7 @@ impl Header<'_> {
         )
     }
 
-    /// `None`: not named, and none of the usual ones is there.
+    /// `None`: not named, and no usual name is there.
     fn find<const N: usize>(
         &self,
         key: &str,
@@ -273,7 +273,7 @@ impl Header<'_> {
         Some(columns)
     }
 
-    /// The place of the only column that is meant; `None` where there is none.
+    /// The place of the only matching column; `None` if there is none.
     fn only(&self, key: &str, is_meant: impl Fn(&String) -> bool) -> Result<Option<usize>, String> {
         let mut meant = (0..self.0.len()).filter(|&at| is_meant(&self.0[at]));
         match (meant.next(), meant.next()) {
@@ -286,7 +286,7 @@ impl Header<'_> {
         }
     }
 
-    /// A column by the name that the scene gives it, which may have the unit that the header lacks.
+    /// A column by its name in the scene, which may have the unit that the header lacks.
     fn named(&self, key: &str, name: &str, quantity: Quantity) -> Result<Column, String> {
         let (plain, told) = split_unit(name, quantity);
         let is_meant = |there: &String| split_unit(there, quantity).0 == plain;

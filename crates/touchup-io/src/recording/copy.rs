@@ -1,4 +1,4 @@
-//! Any recording that can be read, written as MCAP.
+//! Copies any readable recording to MCAP.
 
 use std::path::Path;
 
@@ -7,11 +7,10 @@ use super::{Record, RecordingError, RecordingReader, RecordingWriter, Topics};
 use crate::atomic::AtomicFile;
 use touchup_core::stylus::Message;
 
-/// The frame of messages that name none; one for poses and wrenches, as those that name none are in
-/// the same axes.
+/// Frame of messages without one; the same for poses and wrenches, which then share their axes.
 const UNNAMED: &str = "unnamed";
 
-/// What was written.
+/// Summary of the copy.
 #[derive(Debug, Default)]
 pub struct CopiedRecording {
     /// poses, or frames of markers
@@ -20,20 +19,20 @@ pub struct CopiedRecording {
     pub wrenches: u64,
     /// frame of the poses
     pub pose_frame: String,
-    /// frame in which the wrenches are
+    /// frame of the wrenches
     pub wrench_frame: String,
-    /// where the recording is damaged; what comes before was written
+    /// damage of the recording; everything before it is in the copy
     pub damage: Option<RecordingError>,
 }
 
-/// Writes what is read of a recording to `path`, which is never half a file ([`AtomicFile`]).
+/// Copies a recording to `path`, which is never half a file ([`AtomicFile`]).
 ///
-/// - `topics`: under which it is written.
+/// - `topics`: topics of the copy.
 /// - `at_each`: called after each record, to show the progress.
 ///
 /// # Errors
-/// As [`super::write_recording`]; [`RecordingError::NotARecording`] where it holds no pose or no
-/// wrench that can be used, and its damage where that comes before both.
+/// As [`super::write_recording`]; [`RecordingError::NotARecording`] without a usable pose or
+/// wrench, and its damage if that comes before both.
 pub fn copy_recording(
     reader: &mut RecordingReader,
     path: &Path,
@@ -75,7 +74,7 @@ pub fn copy_recording(
 }
 
 impl RecordingReader {
-    /// It has been read, and there was none.
+    /// The error of a fully read recording that lacks a kind of record.
     fn without(&self, what: &str) -> RecordingError {
         let left_out = self
             .bad_messages()

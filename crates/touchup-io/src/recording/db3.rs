@@ -1,7 +1,7 @@
 //! Reads rosbag2's SQLite files (`.db3`): tables `topics` and `messages`.
 //!
-//! The file is opened read-only and as immutable, so nothing is created beside it, not even when it
-//! was left in write-ahead mode; then its last part may sit in a `-wal` file that is not read, and
+//! The file is opened read-only and as immutable, so that nothing is created beside it, even for
+//! one left in write-ahead mode; then its last part may sit in a `-wal` file that is not read, and
 //! the file counts as truncated.
 
 use std::collections::VecDeque;
@@ -25,14 +25,13 @@ use super::{
 pub(super) const MAGIC: [u8; 16] = *b"SQLite format 3\0";
 /// Rows fetched at a time.
 const BATCH_ROWS: usize = 1024;
-/// Largest file that a `.db3.zstd` may unpack to, so that a small file cannot fill the disk.
+/// Largest unpacked size of a `.db3.zstd`, so that a small file cannot fill the disk.
 const MAX_UNPACKED_BYTES: u64 = 16 << 30;
 
-/// No text or blob of the file, nor anything that its schema computes of them, may be longer: a
-/// column may be generated, and then the file is short and the value is not. SQLite itself refuses
-/// it, before it takes the memory.
+/// Longest text or blob of the file, including computed ones: a generated column makes long values
+/// from a short file. SQLite itself refuses them, before it takes the memory.
 const MAX_VALUE_BYTES: i32 = 1 << 20;
-/// Rows of the table of topics.
+/// Maximum number of rows in the table of topics.
 const MAX_TOPICS: usize = 65_536;
 
 /// Longer payloads are not loaded; they come as NULL and count as malformed.
@@ -46,12 +45,12 @@ pub(super) struct Db3Reader {
     /// Holds the unpacked file while it is read.
     _unpacked: Option<NamedTempFile>,
     topics: Vec<TopicInfo>,
-    /// What is read: its row in the table `topics`, what it gives and how.
+    /// Topics in use: row in the table `topics`, content and format.
     read: Vec<(i64, TopicKind, MessageFormat)>,
     rows: VecDeque<RawMessage<'static>>,
     /// Time and row of the last message fetched.
     last: (i64, i64),
-    /// What ended the fetching, or that the last page is cut; handed out after the rows before it.
+    /// Error that ended the fetching, or a cut last page; comes after the rows before it.
     failed: Option<Damage>,
     done: bool,
     truncated: bool,
@@ -82,7 +81,7 @@ impl Db3Reader {
         }
         let rows = read_topics(&db).map_err(damaged)?;
         let failed = find_cut(&db, db_path).err();
-        // a topic of a wrong type is an error of those who ask for the topics
+        // a topic of a wrong type is an error of the caller's topic check
         let reads = |(id, info): &(i64, TopicInfo)| {
             check_topic(path, layout, info)
                 .ok()
@@ -90,7 +89,7 @@ impl Db3Reader {
                 .map(|(kind, format)| (*id, kind, format))
         };
         let mut read: Vec<_> = rows.iter().filter_map(reads).collect();
-        // the first row of each, as many as the layout names
+        // the first row of each topic in the layout
         read.sort_by_key(|(id, kind, _)| (*kind, *id));
         read.dedup_by_key(|(_, kind, _)| *kind);
         Ok(Self {
@@ -197,7 +196,7 @@ impl RecordingFile for Db3Reader {
     }
 }
 
-/// Rows of the topics that are read: at most three.
+/// Rows of the topics in use: at most three.
 fn ids(read: &[(i64, TopicKind, MessageFormat)]) -> [Option<i64>; 3] {
     [0, 1, 2].map(|at| read.get(at).map(|(id, ..)| *id))
 }
@@ -207,15 +206,15 @@ fn connect(path: &Path) -> rusqlite::Result<Connection> {
         | OpenFlags::SQLITE_OPEN_URI
         | OpenFlags::SQLITE_OPEN_NO_MUTEX;
     let db = Connection::open_with_flags(immutable_uri(path), flags)?;
-    // the file is not trusted: no functions from its schema, no cells that leave their page, no
-    // value without end
+    // the file is untrusted: no functions from its schema, no cells that leave their page, no
+    // unbounded value
     db.set_limit(Limit::SQLITE_LIMIT_LENGTH, MAX_VALUE_BYTES)?;
     db.pragma_update(None, "trusted_schema", false)?;
     db.pragma_update(None, "cell_size_check", true)?;
     Ok(db)
 }
 
-/// `file:` URI with every byte escaped that is not plain.
+/// `file:` URI with every special byte escaped.
 fn immutable_uri(path: &Path) -> String {
     let mut uri = String::from("file:");
     for byte in path.as_os_str().as_encoded_bytes() {
@@ -254,8 +253,7 @@ fn read_topics(db: &Connection) -> Result<Vec<(i64, TopicInfo)>, Damage> {
     Ok(topics)
 }
 
-/// SQLite reads a last page that is cut as if it ended in zeros (whole missing pages it refuses
-/// itself).
+/// SQLite reads a cut last page as if it ended in zeros (whole missing pages it refuses itself).
 fn find_cut(db: &Connection, path: &Path) -> Result<(), Damage> {
     let page_bytes = db.pragma_query_value(None, "page_size", |row| row.get::<_, u32>(0))?;
     match fs::metadata(path)?.len() % u64::from(page_bytes) {

@@ -1,6 +1,6 @@
-//! Poses, wrenches and transforms out of the messages that hold them.
+//! Poses, wrenches and transforms out of their messages.
 //!
-//! Quaternions are x, y, z, w here and where they are encoded, and nowhere else.
+//! Quaternions are x, y, z, w here and in the encoders, and nowhere else.
 
 use super::franka::{ArmState, franka_robot_state, franka_state};
 use super::message_type::{MessageFormat, MessageType};
@@ -8,7 +8,7 @@ use super::wire::{Header, MessageFields, WireReader};
 use super::{BadMessage, Record, point_cloud};
 use touchup_core::stylus::{FrameTransform, Message, StampedPose, StampedWrench};
 
-/// What a message holds.
+/// Content of a message.
 pub(super) enum Decoded {
     /// A pose, wrench or frame of markers, and the frame that its header names.
     Record(String, Record),
@@ -18,12 +18,12 @@ pub(super) enum Decoded {
     Transforms(Vec<FrameTransform>),
 }
 
-/// Least bytes of a `TransformStamped`: stamp, two names without letters, seven numbers.
+/// Minimum bytes of a `TransformStamped`: stamp, two names without letters, seven numbers.
 const TRANSFORM_BYTES: usize = 8 + 4 + 4 + 56;
 
 /// Reads a message. The position may be anything, the rotation is a unit quaternion.
 ///
-/// - `logged_ns`: counts where the type has no stamp of its own.
+/// - `logged_ns`: stamp of types without one of their own.
 pub(super) fn decode(
     format: MessageFormat,
     payload: &[u8],
@@ -40,7 +40,7 @@ pub(super) fn decode(
     decode_fields(format, &mut WireReader::new(wire, payload)?, logged_ns)
 }
 
-/// The same of fields that are unpacked already; markers are none of these.
+/// The same for unpacked fields, which never are markers.
 pub(super) fn decode_fields(
     format: MessageFormat,
     fields: &mut impl MessageFields,

@@ -1,4 +1,4 @@
-//! What can be wrong with a recording, and where.
+//! Faults of a recording, and their places.
 
 use std::io;
 use std::path::PathBuf;
@@ -22,15 +22,15 @@ pub enum RecordingError {
     NotARecording {
         /// file or folder
         path: PathBuf,
-        /// what was found instead and what to do
+        /// actual content and remedy
         reason: String,
     },
-    /// `metadata.yaml` of a recording folder cannot be used.
+    /// `metadata.yaml` of a recording folder is unusable.
     #[error("{}: {reason}; the .mcap or .db3 file itself can be given instead", path.display())]
     Metadata {
         /// the metadata file
         path: PathBuf,
-        /// what is wrong, with line and column where known
+        /// the fault, with line and column where known
         reason: String,
     },
     /// The recording has no topic of that name.
@@ -38,7 +38,7 @@ pub enum RecordingError {
     MissingTopic {
         /// the recording
         path: PathBuf,
-        /// the name asked for
+        /// the requested name
         topic: String,
         /// the flag that names it
         flag: &'static str,
@@ -52,35 +52,35 @@ pub enum RecordingError {
         path: PathBuf,
         /// the topic
         topic: String,
-        /// what it is instead, and what to do
+        /// actual type, and remedy
         why: String,
     },
-    /// The transforms do not have the frame of the stylus, or not in the other one.
+    /// The transforms lack the frame of the stylus, or its link to the other frame.
     #[error("{}: {what}. It has: {found}", path.display())]
     Frames {
         /// the recording
         path: PathBuf,
-        /// what is wrong, and the flag that mends it
+        /// the fault, and the flag that mends it
         what: String,
         /// frames of the tree, as `child (in parent)`
         found: String,
     },
-    /// The columns of a table do not say which is what, or in what unit.
+    /// Columns of a table with unclear meaning or unit.
     #[error("{}: {what}", path.display())]
     Columns {
         /// the table
         path: PathBuf,
-        /// what is wrong, with the columns that are there, and what to do
+        /// the fault, with the present columns, and the remedy
         what: String,
     },
-    /// The file is damaged; everything before that place has been handed out.
+    /// The file is damaged; the reader has returned everything before that place.
     #[error("{}: damaged at {place}: {damage}", path.display())]
     Damaged {
         /// the file
         path: PathBuf,
-        /// where reading stopped
+        /// end of the readable part
         place: FilePlace,
-        /// what is wrong there
+        /// the damage there
         damage: Damage,
     },
     /// A ROS 2 stamp holds 0 <= s < 2^31, so this one cannot be written.
@@ -89,22 +89,22 @@ pub enum RecordingError {
         /// ns
         stamp_ns: i64,
     },
-    /// The system did not write it.
+    /// A failed write.
     #[error(transparent)]
     NotWritten(#[from] FileError),
-    /// The container could not be written.
+    /// A failed write of the container.
     #[error("writing the recording: {0}")]
     Write(#[from] ::mcap::McapError),
-    /// A message could not be encoded.
+    /// A failed encoding of a message.
     #[error("encoding a message: {0}")]
     Encode(#[from] cdr_encoding::Error),
 }
 
-/// What is wrong at a place of a file.
+/// Damage at a place of a file.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Damage {
-    /// The stream cannot be read on: the disk, or a broken zstd frame.
+    /// An unreadable stream: the disk, or a broken zstd frame.
     #[error("cannot be read: {0}")]
     Unreadable(#[from] io::Error),
     /// The file ends inside a record or a page.
@@ -115,10 +115,10 @@ pub enum Damage {
         /// present, bytes
         left: u64,
     },
-    /// A length that no sane recording has.
+    /// An implausible length.
     #[error("{what} of {bytes} bytes, over the limit of {limit} bytes")]
     TooLong {
-        /// of what
+        /// item with this length
         what: &'static str,
         /// announced, bytes
         bytes: u64,
@@ -131,7 +131,7 @@ pub enum Damage {
     /// A checksum does not match.
     #[error("checksum of {what}: stored {stored:08x}, computed {computed:08x}")]
     Checksum {
-        /// of what
+        /// item with this checksum
         what: &'static str,
         /// in the file
         stored: u32,
@@ -149,7 +149,7 @@ pub enum Damage {
         /// bytes
         found: u64,
     },
-    /// A message of a channel, or a channel with a schema, that was not described before.
+    /// A message of an undescribed channel, or a channel with an undescribed schema.
     #[error("{what} {id} is used but not described")]
     Undescribed {
         /// channel or schema
@@ -157,18 +157,17 @@ pub enum Damage {
         /// its number
         id: u16,
     },
-    /// The index at the end of the file promises another number of messages on the topics that are
-    /// read.
+    /// The index at the end of the file promises another number of messages on the topics in use.
     #[error(
         "the file's index promises {promised} messages on the topics of the touch, {found} were found"
     )]
     MessageCount {
         /// by the index
         promised: u64,
-        /// handed out or counted as bad
+        /// returned or counted as bad
         found: u64,
     },
-    /// SQLite's own words.
+    /// An error of SQLite.
     #[error("SQLite: {0}")]
     Sqlite(#[from] rusqlite::Error),
     /// The index of a SQLite file leads backwards.
@@ -176,7 +175,7 @@ pub enum Damage {
     RowOrder,
 }
 
-/// Why a single message was left out, by the name that tables and JSON give it. Reading goes on.
+/// Why a single message was left out, by its name in tables and JSON. Reading continues.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
 #[non_exhaustive]
 pub enum BadMessage {
@@ -192,7 +191,7 @@ pub enum BadMessage {
     /// A point cloud without x, y and z, or whose sizes do not fit its data.
     #[error("bad_cloud")]
     Cloud,
-    /// The header names another frame than the first message of the topic did.
+    /// A frame in the header different from the first message's.
     #[error("frame_changed")]
     FrameChanged,
     /// A transform whose stamp the other links between the two frames never had.
@@ -200,7 +199,7 @@ pub enum BadMessage {
     TransformsApart,
 }
 
-/// How many messages were left out for one reason.
+/// Number of messages left out for one reason.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BadCount {
     /// on the topic of poses or markers
@@ -209,6 +208,6 @@ pub struct BadCount {
     pub wrenches: u64,
     /// file of the first
     pub path: PathBuf,
-    /// where in that file the first is
+    /// place of the first in that file
     pub place: FilePlace,
 }

@@ -1,4 +1,4 @@
-//! The files of a recording, which is one of them or a folder of rosbag2.
+//! The files of a recording: a single one, or a rosbag2 folder.
 
 use std::collections::VecDeque;
 use std::fs::{self, File};
@@ -21,8 +21,8 @@ pub(crate) fn is_of_recording(name: &str) -> bool {
             .is_some_and(|ending| ending == "mcap")
 }
 
-/// The files of a folder of rosbag2, each in the folder itself and none a link; `None`: it is no
-/// recording, or leads out of itself.
+/// The files of a rosbag2 folder, each in the folder itself and none a link; `None` for other
+/// folders, or for files outside.
 pub(crate) fn own_files(folder: &Path) -> Option<Vec<PathBuf>> {
     let is_plain = |path: &Path| fs::symlink_metadata(path).is_ok_and(|about| about.is_file());
     let metadata = folder.join(METADATA);
@@ -34,7 +34,7 @@ pub(crate) fn own_files(folder: &Path) -> Option<Vec<PathBuf>> {
     files.iter().all(is_own).then(|| files.into())
 }
 
-/// The part of rosbag2's `metadata.yaml` that is used.
+/// Used part of rosbag2's `metadata.yaml`.
 #[derive(Deserialize)]
 struct Metadata {
     rosbag2_bagfile_information: BagInformation,
@@ -52,7 +52,7 @@ pub(super) fn files_of(path: &Path) -> Result<VecDeque<PathBuf>, RecordingError>
     }
     let metadata_path = path.join(METADATA);
     if !metadata_path.exists() {
-        // a recorder that was killed wrote none
+        // a killed recorder writes none
         let segments = segments_of(path).map_err(|source| RecordingError::Io {
             path: path.to_owned(),
             source,
@@ -89,7 +89,7 @@ pub(super) fn files_of(path: &Path) -> Result<VecDeque<PathBuf>, RecordingError>
     Ok(files)
 }
 
-/// The name of a recording in a folder that is none of its files, nor one of them unpacked.
+/// A recording in a folder that is none of its listed files, nor one of them unpacked.
 fn not_named(folder: &Path, files: &VecDeque<PathBuf>) -> io::Result<Option<String>> {
     let mut names = Vec::new();
     for entry in fs::read_dir(folder)? {
@@ -101,7 +101,7 @@ fn not_named(folder: &Path, files: &VecDeque<PathBuf>) -> io::Result<Option<Stri
         let name = &packed[..packed.len() - PACKED.len()];
         let plain = name.strip_suffix(PACKED).unwrap_or(name);
         let is_recording = plain.ends_with(".mcap") || plain.ends_with(".db3");
-        // a recorder that was killed leaves empty ones
+        // a killed recorder leaves empty ones
         if is_recording && !is_named && entry.metadata()?.len() > 0 {
             names.push(name.to_owned());
         }

@@ -1,5 +1,5 @@
 //! MCAP's framing: records of opcode and length, fields in little endian, every length checked
-//! before it is used.
+//! before use.
 
 use std::fs::File;
 use std::io::{BufReader, Read};
@@ -10,17 +10,17 @@ use super::Damage;
 /// Longest record, packed or unpacked: far above the 1 MiB chunks of recorders, a small part of a
 /// machine's memory.
 const MAX_RECORD_BYTES: u64 = 256 << 20;
-/// Longest name of a topic or type: the names of all channels are kept, and packed bytes can
-/// pretend to be long ones.
+/// Longest name of a topic or type: the reader keeps all names, and packed bytes can pretend to be
+/// long ones.
 const MAX_TEXT_BYTES: u64 = 64 << 10;
-/// All names of topics and types of a recording together: many long ones would fill the memory.
+/// Maximum total length of all topic and type names: many long ones would fill the memory.
 const MAX_NAMES_BYTES: u64 = 16 << 20;
 /// Opcode and length in front of every record.
 pub(super) const HEAD_BYTES: usize = 9;
-/// Piece in which unused records are skipped.
+/// Piece size for skipping unused records.
 const SKIP_BYTES: u64 = 1 << 20;
 
-/// Opcodes of the records that are read.
+/// Opcodes of the records in use.
 pub(super) mod op {
     pub const FOOTER: u8 = 0x02;
     pub const SCHEMA: u8 = 0x03;
@@ -56,12 +56,12 @@ pub(super) fn check_length(what: &'static str, bytes: u64) -> Result<(), Damage>
     }
 }
 
-/// Counts the bytes of the names that are kept, and refuses more than [`MAX_NAMES_BYTES`].
+/// Total length of the stored names, limited to [`MAX_NAMES_BYTES`].
 #[derive(Default)]
 pub(super) struct NameBytes(u64);
 
 impl NameBytes {
-    /// Takes in a name of `bytes` in the place of one of `replaced`.
+    /// Adds a name of `bytes` in place of one of `replaced`.
     pub fn take(&mut self, bytes: usize, replaced: usize) -> Result<(), Damage> {
         self.0 = (self.0 + bytes as u64).saturating_sub(replaced as u64);
         if self.0 <= MAX_NAMES_BYTES {
@@ -79,9 +79,9 @@ impl NameBytes {
 pub(super) struct ByteStream {
     input: Box<dyn Read + Send>,
     pub at: u64,
-    /// Of the file; unknown while it is unpacked in a stream.
+    /// Size of the file; unknown for a stream of unpacked bytes.
     size: Option<u64>,
-    /// Of everything so far, without the head of the data end.
+    /// Checksum of everything up to here, without the head of the data end.
     pub crc: crc32fast::Hasher,
 }
 
@@ -106,7 +106,7 @@ impl ByteStream {
         })
     }
 
-    /// Opcode and length of the next record; `None` where the file ends between two records.
+    /// Opcode and length of the next record; `None` at a file end between two records.
     pub fn head(&mut self) -> Result<Option<(u8, u64)>, Damage> {
         let mut head = Vec::with_capacity(HEAD_BYTES);
         let left = self
@@ -133,7 +133,7 @@ impl ByteStream {
         Ok(Some((opcode, len)))
     }
 
-    /// Appends the next `len` bytes, a few; `false` where the file ends before them.
+    /// Appends the next `len` bytes, a few; `false` if the file ends before them.
     pub fn front(&mut self, len: u64, into: &mut Vec<u8>) -> Result<bool, Damage> {
         let start = into.len();
         let left = self.input.by_ref().take(len).read_to_end(into)? as u64;
@@ -205,7 +205,7 @@ impl<'a> Fields<'a> {
         Ok(*front)
     }
 
-    /// What has its length in front, in four bytes.
+    /// A field with its length in front, in four bytes.
     pub fn sized(&mut self, what: &'static str) -> Result<&'a [u8], Damage> {
         let bytes = self.u32(what)?;
         self.bytes(bytes.into(), what)
@@ -227,7 +227,7 @@ impl<'a> Fields<'a> {
         self.array(what).map(u64::from_le_bytes)
     }
 
-    /// Bytes that are no UTF-8 are replaced: names only have to compare and print.
+    /// Replaces invalid UTF-8: names only have to compare and print.
     pub fn text(&mut self, what: &'static str) -> Result<String, Damage> {
         let bytes = u64::from(self.u32(what)?);
         if bytes > MAX_TEXT_BYTES {

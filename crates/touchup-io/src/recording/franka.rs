@@ -1,5 +1,4 @@
-//! The states of a Franka arm, which hold the pose of its tool and the wrench on it beside much
-//! else.
+//! The states of a Franka arm: the pose of its tool and the wrench on it, among much else.
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, UnitQuaternion};
 
@@ -29,8 +28,8 @@ const fn franka_numbers(wire: Wire) -> [usize; 3] {
     }
 }
 
-/// Bytes behind the last number of a `FrankaState`: the mode, and twice the flags of errors, of
-/// which releases have more and more.
+/// Bytes behind the last number of a `FrankaState`: the mode, and twice the error flags, whose
+/// number grows with releases.
 const FRANKA_FLAGS: std::ops::RangeInclusive<usize> = 1 + 2 * 30..=1 + 2 * 64;
 
 /// `O_T_EE` and `O_F_ext_hat_K`, both in the axes of the base.
@@ -68,8 +67,8 @@ fn flags(fields: &mut impl MessageFields) -> Result<(), BadMessage> {
     }
 }
 
-/// `o_t_ee` and `o_f_ext_hat_k` of a `franka_msgs/FrankaRobotState`, as franka_ros2 has it up to
-/// 1.0: stamped as the whole, in the frames that they name, or else in that of the whole.
+/// `o_t_ee` and `o_f_ext_hat_k` of a `franka_msgs/FrankaRobotState`, as in franka_ros2 up to 1.0:
+/// with the stamp of the whole, in their own frames, or else in that of the whole.
 pub(super) fn franka_robot_state(fields: &mut impl MessageFields) -> Result<ArmState, BadMessage> {
     let whole = fields.header()?;
     // contacts and collisions in space and of the joints
@@ -111,13 +110,13 @@ pub(super) fn franka_robot_state(fields: &mut impl MessageFields) -> Result<ArmS
     })
 }
 
-/// Passes over a message of a header and so many numbers.
+/// Skips a message of a header and `count` numbers.
 fn stamped_numbers(count: usize, fields: &mut impl MessageFields) -> Result<(), BadMessage> {
     fields.header()?;
     fields.skip_f64s(count)
 }
 
-/// Passes over a `sensor_msgs/JointState`: names, then positions, velocities and efforts.
+/// Skips a `sensor_msgs/JointState`: names, then positions, velocities and efforts.
 fn joint_state(fields: &mut impl MessageFields) -> Result<(), BadMessage> {
     fields.header()?;
     let names = fields.count(4)?;
@@ -129,10 +128,10 @@ fn joint_state(fields: &mut impl MessageFields) -> Result<(), BadMessage> {
     Ok(())
 }
 
-/// A measured rotation is rounded, not wrong, when its columns are this close to orthonormal.
+/// Maximum deviation of a measured rotation's columns from orthonormal, by rounding.
 const ROTATION_SLACK: f64 = 0.02;
 
-/// The motion of a homogeneous 4 × 4 matrix, column by column; `None` when it is none.
+/// The motion of a homogeneous 4 × 4 matrix, column by column; `None` for other matrices.
 fn from_columns(matrix: &[f64; 16]) -> Option<Isometry3<f64>> {
     let [x, y, z, p] =
         [0, 4, 8, 12].map(|at| nalgebra::Vector3::new(matrix[at], matrix[at + 1], matrix[at + 2]));

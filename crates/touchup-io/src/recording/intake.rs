@@ -1,4 +1,4 @@
-//! What becomes of the messages and rows of a recording: records, or counts of what cannot be used.
+//! From messages and rows of a recording to records, and counts of unusable ones.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::path::Path;
@@ -17,15 +17,15 @@ use touchup_core::stylus::Message;
 pub(super) struct Intake {
     pub pose_frame: Option<String>,
     pub wrench_frame: Option<String>,
-    /// of a message that gives several, what comes behind the first
+    /// further records of a message that gives several
     pub others: VecDeque<Record>,
-    /// where the pose comes from transforms
+    /// source of poses from transforms
     chain: Option<TransformChain>,
     pub bad: BTreeMap<BadMessage, BadCount>,
 }
 
 impl Intake {
-    /// Of a recording whose messages name no frames.
+    /// For a recording whose messages name no frames.
     pub fn in_frames(pose: &str, wrench: &str) -> Self {
         Self {
             pose_frame: Some(pose.to_owned()),
@@ -54,20 +54,20 @@ impl Intake {
         decoded.ok().flatten()
     }
 
-    /// The recording is at its end: what waits for transforms gets none.
+    /// Ends the recording: records that wait for transforms get none.
     pub fn finish(&mut self) {
         self.chain.iter_mut().for_each(|chain| chain.poses.finish());
     }
 
-    /// Poses for which transforms were interpolated, and stamps outside of what the transforms
-    /// cover.
+    /// Number of poses from interpolated transforms, and of stamps outside of the transforms'
+    /// range.
     pub fn transform_counts(&self) -> Option<[u64; 2]> {
         self.chain
             .as_ref()
             .map(|chain| [chain.poses.interpolated, chain.poses.outside])
     }
 
-    /// Counts the stamps of which the transforms give no pose.
+    /// Counts the stamps for which the transforms give no pose.
     fn count_apart(&mut self, path: &Path, place: FilePlace) {
         let apart = self
             .chain
@@ -152,7 +152,7 @@ impl Intake {
                 let Some(chain) = &mut self.chain else {
                     return Ok(None);
                 };
-                // of several stamps the newest is the one that was recorded now
+                // the newest of several stamps is the one recorded now
                 let newest_ns = links
                     .iter()
                     .map(|link| link.stamp_ns)
@@ -170,7 +170,7 @@ impl Intake {
     }
 }
 
-/// All messages of a topic name the frame that the first one named.
+/// All messages of a topic must name the frame of the first.
 fn in_one_frame(first: &mut Option<String>, frame: &str) -> Result<(), BadMessage> {
     let is_first = first.get_or_insert_with(|| frame.to_owned()) == frame;
     if is_first {
@@ -180,7 +180,7 @@ fn in_one_frame(first: &mut Option<String>, frame: &str) -> Result<(), BadMessag
     }
 }
 
-/// Reads a message as the file has it.
+/// Reads a message as stored.
 pub(super) fn decode_raw(raw: &RawMessage) -> Result<Decoded, BadMessage> {
     match raw.format.wire {
         Wire::Cdr => decode(raw.format, &unpack(&raw.payload)?, raw.logged_ns),

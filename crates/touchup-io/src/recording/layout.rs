@@ -1,4 +1,4 @@
-//! Where in a recording the poses and wrenches of a touch are.
+//! Places of the poses and wrenches of a touch in a recording.
 
 use super::columns::TableColumns;
 
@@ -11,8 +11,8 @@ pub struct Topics {
     /// `geometry_msgs/msg/WrenchStamped`, or another type that holds a wrench: of the object on the
     /// stylus, N and N·m.
     pub wrench: String,
-    /// `sensor_msgs/msg/PointCloud2`: the markers on the stylus in O, m. When it is named it is
-    /// read in place of the pose, and written beside it.
+    /// `sensor_msgs/msg/PointCloud2`: the markers on the stylus in O, m. If named, readers use it
+    /// in place of the pose, and writers beside it.
     pub markers: Option<String>,
 }
 
@@ -27,22 +27,22 @@ impl Default for Topics {
     }
 }
 
-/// The frames between which a pose is taken from a tree of transforms.
+/// The frames of a pose from a tree of transforms.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TransformFrames {
-    /// That of the stylus, as `tool0`.
+    /// Frame of the stylus, as `tool0`.
     pub moving: String,
-    /// That in which it is wanted; `None`: the root of the tree.
+    /// Reference frame; `None`: the root of the tree.
     pub base: Option<String>,
 }
 
-/// Where the poses and wrenches are, in a recording of any kind.
+/// Places of poses and wrenches, in a recording of any kind.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct RecordingLayout {
     /// Topics of a recording of ROS.
     pub topics: Topics,
-    /// When it is there, the topic of the pose holds `tf2_msgs/msg/TFMessage`; transforms that stay
-    /// are on the topic of the same name with `_static` behind it.
+    /// If given, the topic of the pose holds `tf2_msgs/msg/TFMessage`; static transforms are on the
+    /// topic of the same name with `_static` behind it.
     pub frames: Option<TransformFrames>,
     /// Columns of a table.
     pub columns: TableColumns,
@@ -57,7 +57,7 @@ impl From<&Topics> for RecordingLayout {
     }
 }
 
-/// Of a reference that is borrowed once more, as closures hand it on.
+/// Layout from a reference borrowed once more, as closures pass it on.
 impl From<&&Topics> for RecordingLayout {
     fn from(topics: &&Topics) -> Self {
         Self::from(*topics)
@@ -71,7 +71,7 @@ impl From<&Self> for RecordingLayout {
 }
 
 impl RecordingLayout {
-    /// The topics that are read: those that give the pose, and that of the wrench.
+    /// The topics in use: for the pose, and for the wrench.
     pub(super) fn kinds(&self) -> &'static [TopicKind] {
         match (&self.topics.markers, &self.frames) {
             (Some(_), _) => &[TopicKind::Markers, TopicKind::Wrench],
@@ -85,7 +85,7 @@ impl RecordingLayout {
         }
     }
 
-    /// Those that must be there.
+    /// Required topics.
     pub(super) fn needed(&self) -> impl Iterator<Item = TopicKind> + use<> {
         self.kinds()
             .iter()
@@ -100,7 +100,7 @@ impl RecordingLayout {
             .find(|kind| self.is_topic(*kind, topic))
     }
 
-    /// Whether a topic is the one that gives `kind`.
+    /// Whether a topic gives `kind`.
     pub(super) fn is_topic(&self, kind: TopicKind, topic: &str) -> bool {
         match kind {
             TopicKind::StaticTransforms => topic.strip_suffix("_static") == Some(&self.topics.pose),
@@ -125,7 +125,7 @@ impl TopicInfo {
     }
 }
 
-/// Which of the topics.
+/// Role of a topic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum TopicKind {
     Pose,
@@ -133,7 +133,7 @@ pub(super) enum TopicKind {
     /// Pose and wrench in each message.
     State,
     Markers,
-    /// Transforms that move, and such as stay.
+    /// Moving transforms, and static ones.
     Transforms,
     StaticTransforms,
 }
@@ -152,7 +152,7 @@ impl Topics {
 }
 
 impl TopicKind {
-    /// The type that is written.
+    /// The type for writing.
     pub fn type_name(self) -> &'static str {
         match self {
             Self::Pose => "geometry_msgs/msg/PoseStamped",
@@ -163,7 +163,7 @@ impl TopicKind {
         }
     }
 
-    /// The types that are read, in words.
+    /// The readable types, in words.
     pub fn types(self) -> &'static str {
         match self {
             Self::Pose => {

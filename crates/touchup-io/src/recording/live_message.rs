@@ -1,4 +1,4 @@
-//! Messages of topics that are listened to, read as those of recordings are.
+//! Messages of live topics, decoded like those of recordings.
 
 use std::fmt;
 
@@ -11,7 +11,7 @@ use super::wire::{MAX_MESSAGE_BYTES, SequenceFields, Wire};
 use super::{BadMessage, Record};
 use touchup_core::stylus::Message;
 
-/// What a topic is to give.
+/// Content of a topic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SampleKind {
     /// poses of the stylus
@@ -36,21 +36,21 @@ pub struct LiveType {
     message_type: MessageType,
 }
 
-/// A pose or a wrench, and the frame that its header names; empty where it has none.
+/// A pose or a wrench, and the frame in its header; empty without one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LiveMessage {
-    /// of the pose, or in whose axes the wrench is
+    /// of the pose, or of the wrench's axes
     pub frame: String,
-    /// stamped as its header is, or else when it was received
+    /// stamp of its header, or else time of reception
     pub message: Message,
 }
 
 impl LiveType {
-    /// The type of that name, as ROS 2 has it (`nav_msgs/msg/Odometry`); empty: PoseStamped or
+    /// The type of that name, in ROS 2 form (`nav_msgs/msg/Odometry`); empty: PoseStamped or
     /// WrenchStamped.
     ///
     /// # Errors
-    /// In words, what it is instead and what can be read.
+    /// In words, the actual type and the readable ones.
     pub fn of(kind: SampleKind, type_name: &str) -> Result<Self, String> {
         let usual = kind.topic_kind().type_name();
         let type_name = if type_name.is_empty() {
@@ -71,19 +71,19 @@ impl LiveType {
         Ok(Self { kind, message_type })
     }
 
-    /// Its name, as ROS 2 has it.
+    /// Its name in ROS 2.
     pub fn name(self) -> &'static str {
         self.message_type.name()
     }
 
-    /// Whether its messages say when and in which frame they were measured.
+    /// Whether its messages carry time and frame of the measurement.
     pub fn has_header(self) -> bool {
         self.message_type.has_header()
     }
 
-    /// Reads a message of ROS 2 as it is on the wire, CDR with its four bytes of encapsulation.
+    /// Reads a message of ROS 2 in wire format, CDR with its four bytes of encapsulation.
     ///
-    /// - `received_ns`: counts where the type has no stamp.
+    /// - `received_ns`: stamp for types without one.
     ///
     /// # Errors
     /// [`BadMessage`]
@@ -135,8 +135,7 @@ impl<'de> DeserializeSeed<'de> for LiveSeed {
     type Value = Result<LiveMessage, BadMessage>;
 
     fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<Self::Value, D::Error> {
-        // its fields follow one another as those of a tuple do; how many there are is seen on the
-        // way
+        // fields in sequence, like those of a tuple; their number emerges on the way
         deserializer.deserialize_tuple(MAX_MESSAGE_BYTES, self)
     }
 }

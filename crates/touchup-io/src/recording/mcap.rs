@@ -1,10 +1,10 @@
 //! Reads MCAP from the front, record by record [MCAP specification, mcap.dev/spec].
 //!
-//! Framing and checks are done here, not by the `mcap` crate: that one (0.26) reserves memory for
-//! any string length it meets and overflows on an unchecked chunk whose records overrun it. Here a
-//! length is compared with what the file still holds and with a limit of 256 MiB first, buffers
-//! grow only with bytes that are really there, and a chunk is verified before its first message is
-//! handed out.
+//! Framing and checks are done here, not by the `mcap` crate (0.26), which reserves memory for any
+//! string length it meets and overflows on an unchecked chunk whose records overrun it. Here each
+//! length is first compared with the rest of the file and with a limit of 256 MiB, buffers grow
+//! only with bytes that are really there, and a chunk is verified before its first message is
+//! returned.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -25,7 +25,7 @@ use super::{
 pub(super) const MAGIC: [u8; 8] = *b"\x89MCAP0\r\n";
 /// Footer record and the magic behind it.
 const TAIL_BYTES: usize = HEAD_BYTES + 20 + MAGIC.len();
-/// Topic and how it is read, place of the payload in the records, log time, ns.
+/// Topic and its format, place of the payload in the records, log time, ns.
 type FoundMessage = (TopicKind, MessageFormat, Range<usize>, i64);
 
 /// Channel, sequence, log time and publish time in front of a message's payload.
@@ -37,9 +37,9 @@ pub(super) struct McapReader {
     layout: RecordingLayout,
     stream: ByteStream,
     described: Described,
-    /// What the channels give that are read.
+    /// Content of the channels in use.
     read: BTreeMap<u16, (TopicKind, MessageFormat)>,
-    /// One record as it lies in the file.
+    /// One record as stored in the file.
     packed: Vec<u8>,
     /// Records of the current chunk.
     records: Vec<u8>,
@@ -52,11 +52,10 @@ pub(super) struct McapReader {
 }
 
 impl McapReader {
-    /// Opens a file, or a stream that unpacks one, and learns which of the topics of a touch it
-    /// has.
+    /// Opens a file, or a stream that unpacks one, and finds its topics of a touch.
     ///
-    /// With a usable index at the end of the file that is one seek; without, records are read until
-    /// all of them are described. Damage met on that search is returned beside the reader.
+    /// With a usable index at the end of the file this takes one seek; without, it reads records
+    /// until all topics are described. Damage in that search is returned beside the reader.
     pub fn open(
         path: &Path,
         layout: &RecordingLayout,
@@ -103,8 +102,8 @@ impl McapReader {
         Ok(reader)
     }
 
-    /// Takes over what is described elsewhere; a topic of a wrong type is an error of those who ask
-    /// for the topics.
+    /// Takes over descriptions found elsewhere; a topic of a wrong type is an error of the caller's
+    /// topic check.
     fn knows(&mut self, described: Described) {
         let read = described.channels.iter();
         let read = read.filter_map(|(id, info)| {
@@ -114,7 +113,7 @@ impl McapReader {
         self.described = described;
     }
 
-    /// Reads on until all of them are described.
+    /// Reads on until all topics are described.
     fn describe(&mut self) -> Result<(), RecordingError> {
         while !self.described.has(&self.layout) && self.advance()?.is_some() {}
         Ok(())
@@ -285,7 +284,7 @@ fn unpack_chunk(chunk: &[u8], records: &mut Vec<u8>) -> Result<(), Damage> {
     let packed_len = fields.u64("packed size of a chunk")?;
     let packed = fields.bytes(packed_len, "records of a chunk")?;
     check_length("unpacked chunk", announced)?;
-    // one byte more than announced shows that there is more
+    // one byte beyond the announced size reveals an excess
     let limit = announced + 1;
     match compression.as_str() {
         "" => packed.take(limit).read_to_end(records)?,
@@ -304,7 +303,7 @@ fn unpack_chunk(chunk: &[u8], records: &mut Vec<u8>) -> Result<(), Damage> {
     check_crc("a chunk", crc, crc32fast::hash(records))
 }
 
-/// Schemas and channels met so far; at most 65,536 of each.
+/// Schemas and channels up to now; at most 65,536 of each.
 #[derive(Default)]
 struct Described {
     schemas: BTreeMap<u16, String>,
@@ -366,14 +365,14 @@ impl Described {
 /// The summary at the end of the file.
 struct Index {
     described: Described,
-    /// Messages on each channel, when the file has statistics.
+    /// Messages on each channel, if the file has statistics.
     counts: Option<BTreeMap<u16, u64>>,
-    /// It has a checksum, and that is right.
+    /// It has a correct checksum.
     checked: bool,
 }
 
 impl Index {
-    /// `None` when the file's end is missing or damaged: then the data are searched instead.
+    /// `None` when the file's end is missing or damaged: then the reader searches the data.
     fn read(path: &Path) -> Option<Self> {
         let mut file = File::open(path).ok()?;
         let tail_start = file.metadata().ok()?.len().checked_sub(TAIL_BYTES as u64)?;

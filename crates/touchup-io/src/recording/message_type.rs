@@ -3,7 +3,7 @@
 use super::layout::{TopicInfo, TopicKind};
 use super::wire::Wire;
 
-/// A type of which poses or wrenches are read.
+/// A type that gives poses or wrenches.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum MessageType {
     Pose,
@@ -21,7 +21,7 @@ pub(super) enum MessageType {
     PointCloud,
 }
 
-/// Each by its name; those of ROS 1 have no `msg` in theirs.
+/// Each by its name; ROS 1 names have no `msg`.
 const NAMES: [(&str, MessageType); 13] = [
     ("geometry_msgs/msg/PoseStamped", MessageType::PoseStamped),
     ("geometry_msgs/msg/Pose", MessageType::Pose),
@@ -64,7 +64,7 @@ impl MessageType {
             .map(|(_, message_type)| *message_type)
     }
 
-    /// As ROS 2 has it.
+    /// Its name in ROS 2.
     pub fn name(self) -> &'static str {
         NAMES
             .iter()
@@ -72,7 +72,7 @@ impl MessageType {
             .map_or("", |(name, _)| name)
     }
 
-    /// Whether stamp and frame are those of its header.
+    /// Whether its header gives stamp and frame.
     pub fn has_header(self) -> bool {
         !matches!(self, Self::Pose | Self::Wrench)
     }
@@ -103,10 +103,9 @@ impl MessageType {
         }
     }
 
-    /// The type of a topic that is to give what `kind` says; the error is what the topic is
-    /// instead, and what to do.
+    /// The type of a topic for `kind`; the error names the actual type, and the remedy.
     ///
-    /// - `frame`, `topic`: what names the frame of the stylus, and what chooses another topic.
+    /// - `frame`, `topic`: names of the settings for the stylus frame, and for another topic.
     pub fn giving(
         kind: TopicKind,
         type_name: &str,
@@ -126,7 +125,7 @@ impl MessageType {
     }
 }
 
-/// How a topic is read.
+/// Format of a topic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct MessageFormat {
     pub message_type: MessageType,
@@ -134,8 +133,7 @@ pub(super) struct MessageFormat {
 }
 
 impl MessageFormat {
-    /// That of a topic which is to give what `kind` says; the error is what the topic is instead,
-    /// and what to do.
+    /// The format of a topic for `kind`; the error names the actual type, and the remedy.
     pub fn of(info: &TopicInfo, kind: TopicKind) -> Result<Self, String> {
         let type_name = &info.type_name;
         let message_type = MessageType::giving(kind, type_name, "--pose-frame", kind.flag())?;

@@ -3,11 +3,11 @@
 //! place of the poses the markers on the stylus (`sensor_msgs/msg/PointCloud2`), read from MCAP,
 //! rosbag2 SQLite files, ROS 1 bags and tables of numbers, written as MCAP.
 //!
-//! Both deal in [`touchup_core::stylus::Message`]s, stamped as the message headers are.
-//! [`RecordingReader`] streams: its memory does not grow with the recording, and no length found in
-//! a file is believed before it is checked. [`RecordingWriter`] makes a file that rosbag2, Foxglove
-//! and the Python readers open; [`write_recording`] puts one under its final name only when it is
-//! whole, [`SegmentedWriter`] writes one that grows, in pieces that a crash leaves whole.
+//! Both deal in [`touchup_core::stylus::Message`]s, with the stamps of the message headers.
+//! [`RecordingReader`] streams: its memory does not grow with the recording, and it checks every
+//! length in a file before use. [`RecordingWriter`] makes a file that rosbag2, Foxglove and the
+//! Python readers open; [`write_recording`] publishes only whole ones, [`SegmentedWriter`] writes a
+//! growing one, in pieces that a crash leaves whole.
 
 mod bag;
 mod bag_index;
@@ -50,7 +50,7 @@ pub use reader::RecordingReader;
 pub use segments::SegmentedWriter;
 pub use writer::{RecordingWriter, write_recording};
 
-/// What a zstd frame begins with: a file compressed as a whole, or a message (CDR begins with 0).
+/// Start of a zstd frame: a file compressed as a whole, or a message (CDR begins with 0).
 const ZSTD_MAGIC: [u8; 4] = [0x28, 0xb5, 0x2f, 0xfd];
 
 use std::borrow::Cow;
@@ -62,7 +62,7 @@ use touchup_core::stylus::{MarkerFrame, Message};
 pub enum Record {
     /// A pose or a wrench.
     Message(Message),
-    /// The markers that were seen at one instant.
+    /// The markers seen at one instant.
     Markers(Box<MarkerFrame>),
 }
 
@@ -91,7 +91,7 @@ impl Record {
 }
 
 touchup_core::names! {
-    /// Which time of a message is taken as that of its measurement.
+    /// Source of a message's time of measurement.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
     pub enum StampSource {
         /// The stamp of its header.
@@ -103,25 +103,25 @@ touchup_core::names! {
     }
 }
 
-/// A message as it lies in the file.
+/// A message as stored in the file.
 struct RawMessage<'a> {
     kind: TopicKind,
     format: MessageFormat,
     payload: Cow<'a, [u8]>,
-    /// when the recorder took it, ns
+    /// time of reception by the recorder, ns
     logged_ns: i64,
     place: FilePlace,
 }
 
 /// One file of a recording: its messages on the topics of a touch, one after another.
 trait RecordingFile: Send {
-    /// Topics that are known so far.
+    /// Topics known up to now.
     fn topics(&self) -> Vec<TopicInfo>;
 
-    /// Messages on these topics, where the file says how many.
+    /// Number of messages on these topics, if the file states it.
     fn promised(&self) -> Option<u64>;
 
-    /// It has lost its end, or a part of it is elsewhere.
+    /// Its end is missing, or a part of it is elsewhere.
     fn truncated(&self) -> bool;
 
     /// The next message of these topics; `None` at the end.

@@ -1,8 +1,7 @@
-//! A recording that is a table: comma-separated values and their kin, a line for each instant.
+//! A recording in table form: comma-separated values and their kin, a line for each instant.
 //!
-//! What separates values, and the decimal sign, are those of the whole table
-//! ([`crate::table_rows`]). An empty place, or NaN, in all columns of the position or of the force
-//! means that none was measured at that instant.
+//! Separator and decimal sign hold for the whole table ([`crate::table_rows`]). An empty place, or
+//! NaN, in all columns of the position or of the force means no measurement at that instant.
 
 use std::fs::File;
 use std::io::BufReader;
@@ -18,7 +17,7 @@ use touchup_core::stylus::{StampedPose, StampedWrench, Wrench, measured_rotation
 /// Endings of the names of tables.
 const ENDINGS: [&str; 4] = ["csv", "tsv", "txt", "log"];
 
-/// A table of which none of the first lines can be used is refused; what comes after that many is
+/// Number of first lines that must contain a usable one; unusable lines after them are only
 /// counted.
 const LOOKED_AT: usize = 16;
 
@@ -30,7 +29,7 @@ pub(super) struct NumberTable {
     width: usize,
 }
 
-/// What was measured at one instant.
+/// Measurements of one instant.
 pub(super) struct TableRow {
     pub pose: Option<StampedPose>,
     pub wrench: Option<StampedWrench>,
@@ -46,8 +45,8 @@ impl NumberTable {
     /// Opens a table and finds its columns.
     ///
     /// # Errors
-    /// [`RecordingError::Io`]; [`RecordingError::Columns`] with the columns that are there, when
-    /// they do not say what is what.
+    /// [`RecordingError::Io`]; [`RecordingError::Columns`] with the present columns, if their
+    /// meaning is unclear.
     pub fn open(path: &Path, columns: &TableColumns) -> Result<Self, RecordingError> {
         let bad = |what: &str| RecordingError::Columns {
             path: path.to_owned(),
@@ -86,8 +85,8 @@ impl NumberTable {
         }
     }
 
-    /// Why none of the first lines can be used, by the first of them; `None` where one can. Reads
-    /// them.
+    /// Reason why all first lines are unusable, by the first of them; `None` if one is usable.
+    /// Reads them.
     fn why_unusable(&mut self) -> Result<Option<String>, RecordingError> {
         let mut why = None;
         for _ in 0..LOOKED_AT {
@@ -100,7 +99,7 @@ impl NumberTable {
         Ok(why)
     }
 
-    /// What is wrong with the last line.
+    /// The fault of the last line.
     fn in_words(&self, bad: BadMessage) -> String {
         let (line, width) = (self.rows.line(), self.width);
         let count = self.rows.values().len();
@@ -122,17 +121,17 @@ impl NumberTable {
         }
     }
 
-    /// In whose axes the wrenches are.
+    /// Axes of the wrenches.
     pub fn wrench_axes(&self) -> WrenchAxes {
         self.columns.wrench_axes
     }
 
-    /// Where the last row is.
+    /// Place of the last row.
     pub fn place(&self) -> FilePlace {
         FilePlace::Line(self.rows.line())
     }
 
-    /// The next instant; `None` at the end. The inner error is a line that cannot be used.
+    /// The next instant; `None` at the end. The inner error is an unusable line.
     pub fn next_row(&mut self) -> Result<Option<Result<TableRow, BadMessage>>, RecordingError> {
         match self.rows.advance() {
             Ok(is_there) => Ok(is_there.then(|| self.row())),
@@ -258,7 +257,7 @@ fn rotation(
 
 const NS_PER_S: f64 = 1e9;
 
-/// A time in ns, rounded; whole units and their fraction apart, as a time since 1970 in s has more
+/// A time in ns, rounded; integer and fractional part apart, as a time since 1970 in s has more
 /// digits than a float.
 fn nanoseconds(value: &str, factor: f64) -> Option<i64> {
     let unit_ns = (factor * NS_PER_S).round();

@@ -1,4 +1,4 @@
-//! What kind of file of a recording it is, by what it begins with.
+//! Kind of a recording file, by its first bytes.
 
 use std::fs::File;
 use std::io::{self, Read};
@@ -12,7 +12,7 @@ use super::{RecordingError, RecordingFile, RecordingLayout, ZSTD_MAGIC};
 
 const ROS1_MAGIC: &[u8] = b"#ROSBAG V";
 
-/// Opens one file of a recording; with the damage that was met on the search for its topics.
+/// Opens one file of a recording, with any damage met in the search for its topics.
 pub(super) fn open_file(
     path: &Path,
     layout: &RecordingLayout,

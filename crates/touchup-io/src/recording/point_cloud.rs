@@ -1,8 +1,8 @@
-//! Markers as `sensor_msgs/msg/PointCloud2`: one point for each, with fields x, y, z and, where the
-//! camera identifies markers apart, `id`.
+//! Markers as `sensor_msgs/msg/PointCloud2`: one point for each, with fields x, y, z and, if the
+//! camera identifies markers, `id`.
 //!
-//! Without `id` a point's place in the cloud is its label. A point that is not finite was not seen.
-//! Sizes in a message are compared with the data that are there before anything is read by them.
+//! Without `id` a point's place in the cloud is its label. A point that is not finite was
+//! invisible. Sizes in a message are compared with the available data before any use.
 
 use std::borrow::Cow;
 
@@ -14,7 +14,7 @@ use super::{BadMessage, RecordingError};
 use crate::scalar::Scalar;
 use touchup_core::stylus::{MarkerFrame, MarkerObservation};
 
-/// The message definition, and that of the type it uses.
+/// The message definition, with its field type.
 pub(super) const POINT_CLOUD: &str = "std_msgs/Header header\nuint32 height\nuint32 width\n\
     sensor_msgs/PointField[] fields\nbool is_bigendian\nuint32 point_step\nuint32 row_step\nuint8[] data\nbool is_dense\n";
 pub(super) const POINT_FIELD: (&str, &str) = (
@@ -25,7 +25,7 @@ pub(super) const POINT_FIELD: (&str, &str) = (
 
 const UINT32: u8 = 6;
 const FLOAT32: u8 = 7;
-/// Of the points that are written: x, y, z and id.
+/// Size of a written point: x, y, z and id.
 const POINT_BYTES: usize = 16;
 
 #[derive(Serialize, Deserialize)]
@@ -78,7 +78,7 @@ impl CloudField {
 }
 
 /// Reads a cloud of markers: frame and markers, of which the first
-/// [`touchup_core::stylus::MOST_MARKERS`] that are there count.
+/// [`touchup_core::stylus::MOST_MARKERS`] present count.
 pub(super) fn decode_markers(payload: &[u8]) -> Result<(Cow<'_, str>, MarkerFrame), BadMessage> {
     let msg: PointCloud2Msg = decode(payload)?;
     let mut frame = MarkerFrame::new(msg.header.stamp_ns()?);
@@ -101,13 +101,13 @@ fn read_points(msg: &PointCloud2Msg, frame: &mut MarkerFrame) -> Option<()> {
     if !is_whole || (row == 0 && msg.height > 0 && width > 0) {
         return None;
     }
-    // a row that holds points has bytes, so there are no more rows than data
+    // a row with points has bytes: there are no more rows than data
     let rows = msg.data.chunks_exact(row.max(1)).take(msg.height as usize);
     let points = rows.flat_map(|row| row.chunks_exact(step).take(width));
     for (at, point) in points.enumerate() {
         let position = Point3::new(x.value(point)?, y.value(point)?, z.value(point)?);
         let label = id.map_or(Some(at as f64), |id| id.value(point))?;
-        // a number that is no label becomes one that no marker has
+        // an invalid label becomes one that no marker has
         frame.see(MarkerObservation {
             label: if label >= 0.0 { label as u32 } else { u32::MAX },
             position,

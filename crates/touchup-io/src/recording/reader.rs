@@ -1,4 +1,4 @@
-//! A recording as one sequence of messages, whatever it is kept in.
+//! A recording of any format as one sequence of messages.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::iter::FusedIterator;
@@ -21,15 +21,15 @@ const TABLE_FRAMES: [&str; 2] = ["object", "stylus"];
 
 /// Poses and wrenches of a recording, one after another.
 ///
-/// The order is that of the recording: MCAP files as written (rosbag2 writes as it receives),
-/// SQLite files by time of reception and row. It is not the order of the header stamps: sort by
-/// stamp to pair the two topics, within a bounded buffer.
+/// The order is that of the recording: MCAP files as written (rosbag2 writes in order of
+/// reception), SQLite files by time of reception and row. It is not the order of the header stamps:
+/// sort by stamp to pair the two topics, within a bounded buffer.
 ///
-/// Positions, forces and torques may be NaN or absurd; rotations are unit quaternions. A message
-/// that cannot be used is left out and counted in [`Self::bad_messages`]. A file that is damaged is
-/// read up to the damage; then comes one last item, the error. The iterator gives poses and
-/// wrenches; [`Self::next_record`] also markers. Memory is bounded by the largest chunk, at most
-/// 256 MiB packed and as much unpacked.
+/// Positions, forces and torques may be NaN or absurd; rotations are unit quaternions. An unusable
+/// message is left out and counted in [`Self::bad_messages`]. A damaged file is read up to the
+/// damage; then comes one last item, the error. The iterator gives poses and wrenches;
+/// [`Self::next_record`] also markers. The largest chunk bounds the memory, at most 256 MiB packed
+/// and as much unpacked.
 ///
 /// ```no_run
 /// use touchup_io::recording::{RecordingReader, Topics};
@@ -43,7 +43,7 @@ pub struct RecordingReader {
     layout: RecordingLayout,
     path: PathBuf,
     source: Option<Box<dyn RecordingFile>>,
-    /// in place of the files, where the recording is a table
+    /// in place of the files, for a table
     table: Option<NumberTable>,
     rest: VecDeque<PathBuf>,
     intake: Intake,
@@ -53,16 +53,16 @@ pub struct RecordingReader {
 }
 
 impl RecordingReader {
-    /// Opens a recording, whose topics a [`RecordingLayout`] or [`super::Topics`] name: a table by
+    /// Opens a recording with the topics of a [`RecordingLayout`] or [`super::Topics`]: a table by
     /// its ending, else an `.mcap` or `.db3` file, either of them compressed by zstd as a whole, a
     /// `.bag` of ROS 1, or a rosbag2 folder with its `metadata.yaml`, whose files are read in the
     /// order named there; without it the .mcap files of the folder, in the order of their names.
     /// Their content decides the format.
     ///
     /// # Errors
-    /// [`RecordingError::Frames`] when a pose is wanted from transforms and they do not have it;
-    /// [`RecordingError::MissingTopic`] and [`RecordingError::WrongTopic`] when the recording does
-    /// not have the topics; [`RecordingError::Damaged`] when damage hides whether it has them;
+    /// [`RecordingError::Frames`] if the transforms lack the requested pose;
+    /// [`RecordingError::MissingTopic`] and [`RecordingError::WrongTopic`] if the recording lacks
+    /// the topics; [`RecordingError::Damaged`] if damage hides whether it has them;
     /// [`RecordingError::NotARecording`], [`RecordingError::Metadata`], [`RecordingError::Io`].
     pub fn open(path: &Path, layout: impl Into<RecordingLayout>) -> Result<Self, RecordingError> {
         let layout = layout.into();
@@ -96,7 +96,7 @@ impl RecordingReader {
         Ok(reader)
     }
 
-    /// A table, each of whose rows is a pose and a wrench.
+    /// A table with a pose and a wrench in each row.
     fn of_table(path: &Path, layout: &RecordingLayout) -> Result<Self, RecordingError> {
         let table = NumberTable::open(path, &layout.columns)?;
         let [object, stylus] = TABLE_FRAMES;
@@ -119,13 +119,13 @@ impl RecordingReader {
         })
     }
 
-    /// The same, each message stamped by another of its times.
+    /// The same, with stamps from another source.
     pub fn stamped_by(self, stamps: StampSource) -> Self {
         Self { stamps, ..self }
     }
 
-    /// Messages on the topics of a touch, for a progress bar; `None` when a file does not say (MCAP
-    /// without its end).
+    /// Number of messages on the topics of a touch, for a progress bar; `None` for a file without a
+    /// count (MCAP without its end).
     pub fn message_count(&self) -> Option<u64> {
         self.message_count
     }
@@ -135,23 +135,23 @@ impl RecordingReader {
         self.intake.pose_frame.as_deref()
     }
 
-    /// Frame in which the wrenches are expressed. `None` before the first wrench.
+    /// Frame of the wrenches. `None` before the first wrench.
     pub fn wrench_frame(&self) -> Option<&str> {
         self.intake.wrench_frame.as_deref()
     }
 
-    /// Messages left out so far, and where the first of each reason is.
+    /// Messages left out up to now, and the place of the first for each reason.
     pub fn bad_messages(&self) -> &BTreeMap<BadMessage, BadCount> {
         &self.intake.bad
     }
 
-    /// Where the pose is taken from transforms: poses so far for which a link was interpolated, and
-    /// stamps without a pose before the first or behind the last transform of a link.
+    /// For poses from transforms: number of poses with an interpolated link, and of stamps without
+    /// a pose before the first or behind the last transform of a link.
     pub fn transform_counts(&self) -> Option<[u64; 2]> {
         self.intake.transform_counts()
     }
 
-    /// What a better recording would not lack, a line each: messages left out, and a lost end.
+    /// Defects of the recording, a line each: messages left out, and a lost end.
     pub fn losses(&self) -> Vec<String> {
         let line = |(reason, bad): (&BadMessage, &BadCount)| {
             let (path, place) = (bad.path.display(), &bad.place);
@@ -165,13 +165,12 @@ impl RecordingReader {
         losses
     }
 
-    /// The file that is being read, or was last.
+    /// The current or last file.
     pub(super) fn source_path(&self) -> &Path {
         &self.path
     }
 
-    /// A file has lost its end (the recorder was killed, or a copy was cut); what is there is read
-    /// all the same.
+    /// A file has lost its end (a killed recorder, or a cut copy); the rest is read all the same.
     pub fn truncated(&self) -> bool {
         self.truncated
     }

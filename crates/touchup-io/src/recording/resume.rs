@@ -1,4 +1,4 @@
-//! A recording that is begun in the place of another one, or goes on behind it, also after a crash.
+//! Replacement of a recording, and its continuation, also after a crash.
 
 use std::fs::{create_dir_all, remove_file};
 use std::io::{self, ErrorKind};
@@ -10,8 +10,7 @@ use super::{RecordingError, RecordingReader, SegmentedWriter, Topics, write_reco
 use touchup_core::stylus::Message;
 
 impl SegmentedWriter {
-    /// Begins a recording in a folder, which is made where it is not there, in place of an older
-    /// one.
+    /// Begins a recording in a folder, which is made if missing, in place of an older one.
     ///
     /// # Errors
     /// [`RecordingError::NotWritten`].
@@ -25,13 +24,13 @@ impl SegmentedWriter {
         Ok(Self::new(folder, topics))
     }
 
-    /// Goes on behind the recording in a folder.
+    /// Continues the recording in a folder.
     ///
-    /// A segment that a crash left without its end is written anew as far as it can be read; where
-    /// nothing of the last one can be read it is removed.
+    /// A segment without its end after a crash is rewritten as far as it is readable; an unreadable
+    /// last one is removed.
     ///
     /// - `frames`: of the poses, and of the wrenches.
-    /// - `each`: receives the messages that are there, in their order.
+    /// - `each`: receives the existing messages, in their order.
     ///
     /// # Errors
     /// [`RecordingError`]
@@ -83,7 +82,7 @@ fn segment_paths(folder: &Path) -> Vec<PathBuf> {
         .collect()
 }
 
-/// The messages of a segment up to where it is damaged, and whether it has its end.
+/// The messages of a segment up to its damage, and whether it has its end.
 fn read_segment(path: &Path, topics: &Topics) -> Result<(Vec<Message>, bool), RecordingError> {
     let mut reader = match RecordingReader::open(path, topics) {
         Ok(reader) => reader,

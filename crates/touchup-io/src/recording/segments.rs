@@ -1,4 +1,4 @@
-//! A recording that grows while somebody touches, and of which a crash takes only the last moment.
+//! A growing recording that loses only the last moment in a crash.
 
 use std::fmt::Write as _;
 use std::fs::File;
@@ -10,22 +10,21 @@ use super::{RecordingError, RecordingWriter, TopicKind, Topics};
 use crate::atomic::write_atomically;
 use touchup_core::stylus::Message;
 
-/// Names the files of a recording that was ended.
+/// Names the files of a completed recording.
 pub(super) const METADATA: &str = "metadata.yaml";
 
 /// Messages of one file: a quarter of an hour of a stylus, 60 MB.
 const MOST_IN_A_SEGMENT: u64 = 1_000_000;
 
 /// Writes poses and wrenches into files `touch_0000.mcap`, `touch_0001.mcap`, … of one folder, each
-/// of which is opened by what opens MCAP. What was written before [`Self::flush`] is with the
-/// system after it, whatever becomes of the process. [`Self::finish`] makes the folder a recording
-/// of rosbag2.
+/// readable as MCAP. After [`Self::flush`] all messages before it are with the system, whatever
+/// becomes of the process. [`Self::finish`] makes the folder a recording of rosbag2.
 pub struct SegmentedWriter {
     folder: PathBuf,
     topics: Topics,
     current: Option<RecordingWriter<BufWriter<File>>>,
     pub(super) segments: Vec<FileSegment>,
-    /// messages that [`Self::flush`] has not handed over yet
+    /// messages since the last [`Self::flush`]
     unflushed: u64,
     /// length of the file after the last flush, bytes
     flushed_length: u64,
@@ -69,9 +68,9 @@ impl FileSegment {
 }
 
 impl SegmentedWriter {
-    /// Nothing is written yet.
+    /// An empty recording.
     ///
-    /// - `folder`: is there and holds no segments.
+    /// - `folder`: exists, without segments.
     pub fn new(folder: &Path, topics: &Topics) -> Self {
         let (folder, topics) = (folder.to_owned(), topics.clone());
         Self {
@@ -109,8 +108,8 @@ impl SegmentedWriter {
         let path = self.folder.join(&segment.name);
         let file = File::create_new(&path).map_err(|error| not_written(&path, error))?;
         let begun = RecordingWriter::new(BufWriter::new(file), &self.topics);
-        // a full disk takes a file and not its first bytes: an empty one would be in the way of the
-        // next for ever
+        // a full disk takes a file and not its first bytes: an empty one would block the next for
+        // ever
         self.current = Some(begun.inspect_err(|_| drop(std::fs::remove_file(&path)))?);
         self.segments.push(segment);
         Ok(())
@@ -132,7 +131,7 @@ impl SegmentedWriter {
         Ok(())
     }
 
-    /// Flushes to the operating system; returns how many messages these are.
+    /// Flushes to the operating system; returns the number of flushed messages.
     ///
     /// # Errors
     /// [`RecordingError::Write`], [`RecordingError::NotWritten`].
@@ -152,7 +151,7 @@ impl SegmentedWriter {
         Ok(std::mem::take(&mut self.unflushed))
     }
 
-    /// Brings to the disk all that was written, whatever becomes of the machine.
+    /// Syncs everything to the disk, to survive a failure of the machine.
     ///
     /// # Errors
     /// As [`Self::flush`].
@@ -171,21 +170,21 @@ impl SegmentedWriter {
         synced.map_err(|error| not_written(&path, error))
     }
 
-    /// After an error: leaves of the file what was flushed, and nothing of one that was not. What
-    /// is written next begins another. Returns how many messages are lost.
+    /// After an error: cuts the file to its flushed part, or removes an unflushed one. The next
+    /// message begins another file. Returns the number of lost messages.
     pub fn give_up_segment(&mut self) -> u64 {
-        // where none was begun, those before it stay
+        // without a current segment earlier ones stay
         let Some(writer) = self.current.take() else {
             return 0;
         };
-        // tries once more to write what it holds
+        // tries once more to write its buffer
         drop(writer);
         let Some(segment) = self.segments.pop() else {
             return 0;
         };
         let path = self.folder.join(&segment.name);
         let flushed = std::mem::take(&mut self.flushed_length);
-        // where even that is refused, the file's end is one that a reader passes over
+        // if that fails too, a reader skips the file's end
         let _ = match flushed {
             0 => std::fs::remove_file(path),
             _ => File::options()
@@ -199,9 +198,8 @@ impl SegmentedWriter {
         std::mem::take(&mut self.unflushed)
     }
 
-    /// Ends the last file and writes `metadata.yaml`; nothing when nothing was written. A recording
-    /// of which a file has no proper end gets none: touchup reads it by its files, as after a
-    /// crash.
+    /// Ends the last file and writes `metadata.yaml`; nothing for an empty recording. A recording
+    /// with a file without a proper end gets none: touchup reads its files, as after a crash.
     ///
     /// # Errors
     /// [`RecordingError::Write`], [`RecordingError::NotWritten`].
@@ -215,7 +213,7 @@ impl SegmentedWriter {
             .map_err(|error| not_written(&path, error))
     }
 
-    /// As rosbag2 writes it, version 5: every release reads that.
+    /// In the form of rosbag2, version 5, which every release reads.
     fn metadata(&self) -> String {
         let all = &self.segments;
         let [poses, wrenches] =
@@ -268,8 +266,8 @@ impl SegmentedWriter {
     }
 }
 
-/// The segments of a folder that has no `metadata.yaml`, as a crash leaves it, in their order; one
-/// in which nothing stands is left out.
+/// The segments of a folder without `metadata.yaml`, as after a crash, in their order, except empty
+/// ones.
 pub(super) fn segments_of(folder: &Path) -> io::Result<Vec<PathBuf>> {
     let mut found = Vec::new();
     for entry in folder.read_dir()? {

@@ -1,4 +1,4 @@
-//! The topics that a recording has, against those that are wanted of it.
+//! Topics of a recording against the required ones.
 
 use std::path::Path;
 
@@ -6,7 +6,7 @@ use super::RecordingError;
 use super::layout::{RecordingLayout, TopicInfo, TopicKind};
 use super::message_type::MessageFormat;
 
-/// The topics that are needed exist, and those that are read have types that give what is wanted.
+/// Checks that the required topics exist, and that the topics in use have suitable types.
 pub(super) fn check_topics(
     path: &Path,
     layout: &RecordingLayout,
@@ -37,7 +37,7 @@ pub(super) fn check_topics(
         .try_for_each(|info| check_topic(path, layout, info).map(drop))
 }
 
-/// What a topic gives and how it is read; `None` when it is none of those that are.
+/// Content and format of a topic; `None` for unused ones.
 pub(super) fn check_topic(
     path: &Path,
     layout: &RecordingLayout,

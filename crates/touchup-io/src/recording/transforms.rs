@@ -1,8 +1,7 @@
-//! The pose of one frame in another, from a tree of transforms as `/tf` and `/tf_static` publish
-//! it.
+//! The pose of one frame in another, from a tree of transforms of `/tf` and `/tf_static`.
 //!
-//! pose_base_moving = pose_base_a · pose_ab · … · pose_z_moving; links that stay count at any time,
-//! those that move are brought to one instant by [`MovingFrame`].
+//! pose_base_moving = pose_base_a · pose_ab · … · pose_z_moving; static links hold at any time,
+//! [`MovingFrame`] brings moving ones to one instant.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -14,13 +13,13 @@ use touchup_core::stylus::{FrameBuffer, FrameTransform, MovingFrame, StampedPose
 
 /// Frames of a tree: an arm has ten, a plant some hundred.
 const MOST_FRAMES: usize = 10_000;
-/// Transforms with which every publisher has been heard; until then the root of the tree may not be
-/// known.
+/// Number of transforms that covers every publisher; until then the root of the tree may be
+/// unknown.
 const MESSAGES_OF_A_TREE: u64 = 200;
-/// Frames that an error names.
+/// Maximum number of frames in an error.
 const MOST_NAMED: usize = 40;
 
-/// What is known of a tree before its first pose.
+/// State of a tree before its first pose.
 #[derive(Default)]
 pub(super) struct TransformTree {
     links: BTreeMap<String, TreeLink>,
@@ -30,7 +29,7 @@ pub(super) struct TransformTree {
 #[derive(Clone)]
 struct TreeLink {
     parent: String,
-    /// of a link that stays
+    /// of a static link
     fixed: Option<Isometry3<f64>>,
 }
 
@@ -57,7 +56,7 @@ impl TransformTree {
         }
     }
 
-    /// Whether what follows can hardly add to the chain between the frames.
+    /// Whether later messages can hardly add to the chain between the frames.
     pub fn is_enough(&self, frames: &TransformFrames) -> bool {
         self.links.contains_key(&frames.moving)
             && (frames.base.is_some() || self.messages >= MESSAGES_OF_A_TREE)
@@ -87,7 +86,7 @@ impl TransformTree {
     /// The chain between the frames.
     ///
     /// # Errors
-    /// [`RecordingError::Frames`] when the tree does not have it, or when it does not move.
+    /// [`RecordingError::Frames`] if the tree lacks it, or if it does not move.
     pub fn into_chain(
         self,
         frames: &TransformFrames,
@@ -139,7 +138,7 @@ impl TransformTree {
         Ok(chain)
     }
 
-    /// Each frame with the one that it hangs on.
+    /// Each frame with its parent.
     fn found(&self) -> String {
         let link = |(child, link): (&String, &TreeLink)| format!("{child} (in {})", link.parent);
         let mut named: Vec<_> = self.links.iter().take(MOST_NAMED).map(link).collect();
@@ -157,11 +156,11 @@ impl TransformTree {
 struct ChainLink {
     child: String,
     parent: String,
-    /// of a link that stays
+    /// of a static link
     fixed: Option<Isometry3<f64>>,
 }
 
-/// The links between two frames, and where they were lately.
+/// The links between two frames, and their latest poses.
 pub(super) struct TransformChain {
     pub poses: MovingFrame,
     /// from the moving frame up
@@ -173,7 +172,7 @@ impl TransformChain {
     /// Takes in the links of one message.
     ///
     /// # Errors
-    /// [`BadMessage::FrameChanged`] for a frame that hangs on another one now.
+    /// [`BadMessage::FrameChanged`] for a frame with a new parent.
     pub fn push(
         &mut self,
         transforms: Vec<FrameTransform>,
@@ -186,7 +185,7 @@ impl TransformChain {
             if link.parent != transform.parent {
                 return Err(BadMessage::FrameChanged);
             }
-            // what stays is repeated by some on the topic of what moves
+            // some publishers repeat static links on the topic of moving ones
             let is_static = are_static || link.fixed.is_some();
             if self.poses.push(&mut self.frames, &[transform], is_static) > 0 {
                 return Err(BadMessage::Malformed);
@@ -218,7 +217,7 @@ mod tests {
         }
     }
 
-    /// What a message gives.
+    /// Pose from a message.
     fn pushed(chain: &mut TransformChain, links: Vec<FrameTransform>) -> Option<StampedPose> {
         chain.push(links, false).unwrap();
         chain.next_pose()
@@ -231,7 +230,7 @@ mod tests {
         }
     }
 
-    /// world → base stays, base → arm and arm → hand move, hand → tool0 stays.
+    /// world → base is static, base → arm and arm → hand move, hand → tool0 is static.
     fn tree() -> TransformTree {
         let mut tree = TransformTree::default();
         tree.add(
@@ -294,7 +293,7 @@ mod tests {
             None
         );
         assert!(pushed(&mut chain, vec![link(5, "arm", "hand", 1.0, 0.0)]).is_some());
-        // what concerns other frames gives nothing, and what stays may be repeated among what moves
+        // links of other frames give nothing, and static ones may repeat among moving ones
         assert_eq!(
             pushed(&mut chain, vec![link(8, "base", "camera", 1.0, 0.0)]),
             None

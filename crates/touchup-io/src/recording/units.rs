@@ -1,6 +1,6 @@
 //! Units in the header of a table.
 
-/// What a column measures.
+/// Physical quantity of a column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Quantity {
     Time,
@@ -13,8 +13,8 @@ pub(super) enum Quantity {
 }
 
 impl Quantity {
-    /// Units by the names that a header gives them in lower case, and how many of SI they are; the
-    /// first is the usual one.
+    /// Units by their names in a header, in lower case, and their factors to SI; the first is the
+    /// usual one.
     fn known(self) -> &'static [(&'static str, f64)] {
         match self {
             Self::Time => &[
@@ -40,7 +40,7 @@ impl Quantity {
         }
     }
 
-    /// How many of SI a unit is.
+    /// Factor of a unit to SI.
     pub fn factor(self, unit: &str) -> Option<f64> {
         let unit = unit.trim().to_lowercase();
         self.known()
@@ -67,8 +67,7 @@ impl Quantity {
     }
 }
 
-/// A name without its unit, and how many of SI the unit is; `None` where there is none that is
-/// known.
+/// A name without its unit, and the unit's factor to SI; `None` without a known unit.
 pub(super) fn split_unit(name: &str, quantity: Quantity) -> (&str, Option<f64>) {
     let name = name.trim();
     if quantity == Quantity::None {

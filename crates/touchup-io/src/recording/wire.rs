@@ -1,9 +1,8 @@
-//! The numbers, names and poses of a ROS message, one after another, in either of the two ways in
-//! which ROS lays them out.
+//! The numbers, names and poses of a ROS message, in sequence, in either wire format of ROS.
 //!
 //! ROS 2: CDR, XCDR version 1, in either byte order, each number at a multiple of its size, strings
-//! with a final zero. ROS 1: little endian, nothing between the fields. No length is believed
-//! before it is compared with the bytes that are there.
+//! with a final zero. ROS 1: little endian, nothing between the fields. Each length is compared
+//! with the available bytes before use.
 
 use nalgebra::{Isometry3, Quaternion};
 use serde::Deserialize;
@@ -15,13 +14,13 @@ use touchup_core::stylus::{Wrench, measured_rotation};
 /// Longest payload of a message: 84 bytes of numbers and a frame name for a pose, some hundred
 /// transforms for a tree of frames.
 pub(super) const MAX_MESSAGE_BYTES: usize = 64 * 1024;
-/// CDR payloads are padded to four bytes by some middlewares; more left over is another type.
+/// Maximum padding of CDR payloads, to four bytes by some middlewares; more means another type.
 const MAX_PADDING_BYTES: usize = 3;
-/// Longest name of a frame: those of a tree are kept.
+/// Longest name of a frame: the reader keeps those of a tree.
 const MAX_FRAME_NAME_BYTES: usize = 1024;
 const NS_PER_S: i64 = 1_000_000_000;
 
-/// How the messages of a topic are laid out.
+/// Wire format of the messages of a topic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Wire {
     /// of ROS 2, with its four bytes of encapsulation
@@ -31,7 +30,7 @@ pub(super) enum Wire {
 }
 
 impl Wire {
-    /// By the name that a recording gives the encoding.
+    /// By the encoding's name in a recording.
     pub fn of(encoding: &str) -> Option<Self> {
         match encoding {
             "cdr" => Some(Self::Cdr),
@@ -57,7 +56,7 @@ pub(super) trait MessageFields {
     /// The name of a frame, or of a joint.
     fn name(&mut self) -> Result<String, BadMessage>;
 
-    /// Bytes behind what was read, at most as many as a message has. Nothing is read any more.
+    /// Number of remaining bytes, up to the maximum of a message. Ends the reading.
     fn rest(&mut self) -> usize;
 
     /// A `std_msgs/Header`.
@@ -67,12 +66,12 @@ pub(super) trait MessageFields {
         header_of(i64::from(sec.cast_signed()), nanosec, &self.name()?)
     }
 
-    /// Count of a sequence each of whose entries takes at least `least_bytes`.
+    /// Count of a sequence with entries of at least `least_bytes`.
     fn count(&mut self, _least_bytes: usize) -> Result<usize, BadMessage> {
         usize::try_from(self.u32()?).map_err(|_| BadMessage::Malformed)
     }
 
-    /// The message ends here.
+    /// Requires the end of the message.
     fn end(&mut self) -> Result<(), BadMessage> {
         if self.rest() <= MAX_PADDING_BYTES {
             Ok(())
@@ -89,7 +88,7 @@ pub(super) trait MessageFields {
         Ok(numbers)
     }
 
-    /// Position and quaternion (x, y, z, w), which a pose and a transform have in the same order.
+    /// Position and quaternion (x, y, z, w), in the same order in a pose and a transform.
     fn pose(&mut self) -> Result<Isometry3<f64>, BadMessage> {
         let position = self.f64s::<3>()?;
         let rotation =
@@ -104,7 +103,7 @@ pub(super) trait MessageFields {
         })
     }
 
-    /// Passes over numbers.
+    /// Skips numbers.
     fn skip_f64s(&mut self, count: usize) -> Result<(), BadMessage> {
         (0..count).try_for_each(|_| self.f64().map(drop))
     }
@@ -115,7 +114,7 @@ fn header_of(sec: i64, nanosec: u32, frame: &str) -> Result<Header, BadMessage> 
     if nanosec >= NS_PER_S {
         return Err(BadMessage::Stamp);
     }
-    // a slash in front says nothing
+    // a leading slash has no meaning
     let frame = frame.strip_prefix('/').unwrap_or(frame).to_owned();
     Ok(Header {
         stamp_ns: sec * NS_PER_S + nanosec,
@@ -123,7 +122,7 @@ fn header_of(sec: i64, nanosec: u32, frame: &str) -> Result<Header, BadMessage> 
     })
 }
 
-/// What is left of a payload.
+/// The rest of a payload.
 pub(super) struct WireReader<'a> {
     wire: Wire,
     is_big: bool,
@@ -133,8 +132,8 @@ pub(super) struct WireReader<'a> {
 
 impl<'a> WireReader<'a> {
     /// # Errors
-    /// [`BadMessage::Malformed`] for a payload that is too long, or whose encapsulation is not that
-    /// of XCDR version 1.
+    /// [`BadMessage::Malformed`] for a payload that is too long, or without the encapsulation of
+    /// XCDR version 1.
     pub fn new(wire: Wire, payload: &'a [u8]) -> Result<Self, BadMessage> {
         let (is_big, body) = match (wire, payload.split_first_chunk()) {
             (Wire::Ros1, _) => (false, payload),
@@ -251,7 +250,7 @@ impl MessageFields for WireReader<'_> {
     }
 }
 
-/// The fields as a deserializer hands them out, for messages that a library receives and unpacks.
+/// The fields from a deserializer, for messages that a library receives and unpacks.
 pub(super) struct SequenceFields<A>(pub A);
 
 impl<'de, A: SeqAccess<'de>> SequenceFields<A> {

@@ -15,8 +15,8 @@ use crate::atomic::AtomicFile;
 use crate::file_error::FileError;
 use touchup_core::stylus::Message;
 
-/// Message definitions in the form rosbag2 stores: the type, then each type it uses behind a line
-/// of 80 equals signs.
+/// Separator in message definitions in rosbag2's form: the type, then each type it uses behind a
+/// line of 80 equals signs.
 const RULE: &str =
     "================================================================================";
 const POSE_STAMPED: &str = "std_msgs/Header header\ngeometry_msgs/Pose pose\n";
@@ -55,7 +55,7 @@ fn definition(kind: TopicKind) -> String {
             POINT_CLOUD.to_owned(),
             [HEADER, TIME, POINT_FIELD].as_slice(),
         ),
-        // what is written of a pose, however it was read
+        // written form of a pose from any source
         _ => (
             POSE_STAMPED.to_owned(),
             [HEADER, TIME, POSE, POINT, QUATERNION].as_slice(),
@@ -88,13 +88,13 @@ impl<W: Write + Seek> RecordingWriter<W> {
     /// Begins a recording.
     ///
     /// # Errors
-    /// [`RecordingError::Write`] when `out` cannot be written.
+    /// [`RecordingError::Write`] for a failed write to `out`.
     pub fn new(out: W, topics: &Topics) -> Result<Self, RecordingError> {
         let options = WriteOptions::new()
             .profile("ros2")
             .library(concat!("touchup ", env!("CARGO_PKG_VERSION")))
             .compression(Some(Compression::Zstd))
-            // several threads cut the stream elsewhere on another machine
+            // with threads the cuts of the stream depend on the machine
             .compression_threads(0);
         let mut mcap = options.create(out)?;
         let pose = add_channel(&mut mcap, topics, TopicKind::Pose)?;
@@ -113,12 +113,11 @@ impl<W: Write + Seek> RecordingWriter<W> {
 
     /// Appends one message or frame of markers; markers without a topic are left out.
     ///
-    /// - `frame`: for its header; of poses and markers the object frame O, of a wrench that in
-    ///   which it is expressed.
+    /// - `frame`: for its header; for poses and markers the object frame O, for a wrench the frame
+    ///   of its axes.
     ///
     /// # Errors
-    /// [`RecordingError::Stamp`] when its stamp does not fit a ROS 2 message;
-    /// [`RecordingError::Write`].
+    /// [`RecordingError::Stamp`] for a stamp beyond a ROS 2 message; [`RecordingError::Write`].
     pub fn write(&mut self, record: impl Into<Record>, frame: &str) -> Result<(), RecordingError> {
         let record = record.into();
         let (payload, channel) = match &record {
@@ -180,12 +179,11 @@ fn add_channel<W: Write + Seek>(
 
 /// Writes a whole recording to `path`, which is never half a file ([`AtomicFile`]).
 ///
-/// - `pose_frame`: name of the object frame O, which poses and markers are in; `wrench_frame`: name
-///   of the frame the wrenches are expressed in.
+/// - `pose_frame`: name of the object frame O of poses and markers; `wrench_frame`: name of the
+///   frame of the wrenches.
 ///
 /// # Errors
-/// As [`RecordingWriter`], and [`RecordingError::NotWritten`] with the path for whatever the system
-/// refuses.
+/// As [`RecordingWriter`], and [`RecordingError::NotWritten`] with the path for any system error.
 pub fn write_recording(
     path: &Path,
     topics: &Topics,
@@ -215,7 +213,7 @@ pub(super) fn not_written(path: &Path, source: io::Error) -> RecordingError {
 }
 
 impl RecordingError {
-    /// With the path, where it is one of writing the container.
+    /// Adds the path to an error of writing the container.
     pub(super) fn of_file(self, path: &Path) -> Self {
         match self {
             Self::Write(McapError::Io(source)) => not_written(path, source),

@@ -8,7 +8,7 @@ use super::header::{Element, Encoding, PlyHeader, PlyKind};
 use crate::file_error::FilePlace;
 use crate::scalar::Scalar;
 
-/// What is left of the body.
+/// The remaining body.
 pub(super) struct Body<'a> {
     bytes: &'a [u8],
     encoding: Encoding,
@@ -37,8 +37,7 @@ impl<'a> Body<'a> {
         }
     }
 
-    /// Refuses an element for whose rows there are not enough bytes: after this its count may be
-    /// trusted for memory.
+    /// Refuses an element with too few bytes for its rows: afterwards its count is safe for memory.
     pub fn check_count(&self, element: &Element) -> Result<(), Syntax> {
         let place = FilePlace::Line(element.line);
         if element.count > 0 && element.properties.is_empty() {
@@ -65,7 +64,7 @@ impl<'a> Body<'a> {
 
     /// Reads `count` rows. `take` gets the items of the list in column `list`, or else one value
     /// for each column (0 for a list), and the place of the row. In ASCII a row is a line; empty
-    /// lines are passed over.
+    /// lines are skipped.
     pub fn rows(
         &mut self,
         element: &Element,
@@ -115,8 +114,8 @@ impl<'a> Body<'a> {
         Ok(())
     }
 
-    /// Three columns, multiplied by `scale`, of all rows of a binary element without lists; `None`,
-    /// and nothing read, when it has lists, is ASCII, or the file ends before its last row.
+    /// Three columns, times `scale`, of all rows of a binary element without lists; `None`, without
+    /// reading, for lists, ASCII, or a file that ends before its last row.
     pub fn fixed_rows(
         &mut self,
         element: &Element,
@@ -143,7 +142,7 @@ impl<'a> Body<'a> {
         let column = |row: &[u8], (at, scalar): (usize, Scalar)| {
             scale * scalar.value(&row[at..], big).unwrap_or(f64::NAN)
         };
-        // the types are known to the compiler in the two usual cases
+        // the two usual cases, with types known to the compiler
         let point = |row, x, y, z| Point3::new(column(row, x), column(row, y), column(row, z));
         let of_type = |row, t| point(row, (x.0, t), (y.0, t), (z.0, t));
         Some(match [x.1, y.1, z.1] {
@@ -157,9 +156,8 @@ impl<'a> Body<'a> {
         })
     }
 
-    /// The rows that are triangles in the usual layout (a list of three 32-bit numbers and nothing
-    /// else, little endian), up to the first row that is not. Strips look the same and are left
-    /// alone.
+    /// The rows that are triangles in the usual layout (only a list of three 32-bit numbers, little
+    /// endian), up to the first other row. Strips look the same and stay unread.
     pub fn triangles(&mut self, element: &Element) -> Vec<[u32; 3]> {
         const ROW: usize = 13;
         let usual = |kind| {
@@ -210,8 +208,7 @@ fn read_row(
                 if items < 0.0 || items.fract() != 0.0 {
                     return Err(Syntax::unexpected(place, "the length of a list", items));
                 }
-                // a length that is too large runs into the end of the file; nothing is reserved for
-                // it
+                // an excessive length runs into the end of the file, without any allocation
                 for _ in 0..items as u64 {
                     let value = next(item)?;
                     if list == Some(column) {

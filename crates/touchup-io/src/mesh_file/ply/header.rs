@@ -5,7 +5,7 @@ use super::super::text::NumberedLines;
 use crate::file_error::FilePlace;
 use crate::scalar::Scalar;
 
-/// How the body is written.
+/// Encoding of the body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Encoding {
     Ascii,
@@ -30,7 +30,7 @@ pub(super) struct Element {
     pub name: String,
     pub count: usize,
     pub properties: Vec<Property>,
-    /// where it is announced
+    /// line of its declaration
     pub line: usize,
 }
 
@@ -72,7 +72,7 @@ pub(super) struct PlyHeader {
 
 impl PlyHeader {
     pub fn read(bytes: &[u8]) -> Result<Self, Syntax> {
-        // the first line shows how lines end here: the body may begin with any byte
+        // the first line shows the line ending: the body may begin with any byte
         let end_of_line = match bytes {
             [b'p', b'l', b'y', b'\r', rest @ ..] if rest.first() != Some(&b'\n') => b'\r',
             _ => b'\n',

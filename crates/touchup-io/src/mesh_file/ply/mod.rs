@@ -16,16 +16,16 @@ use crate::file_error::FilePlace;
 use body::Body;
 use header::{Element, PlyHeader};
 
-/// Names of the list of a face's vertices; both are common.
+/// Usual names of the list of a face's vertices.
 const VERTEX_LISTS: [&str; 2] = ["vertex_indices", "vertex_index"];
 
-/// Names of the texture coordinates of the corners of a face, a list, and of the image it shows.
+/// Names of a face's list of texture coordinates of its corners, and of its image.
 const OF_CORNERS: [&str; 2] = ["texcoord", "texnumber"];
-/// An image is named by a comment that starts so.
+/// Start of a comment that names an image.
 const IMAGE: &str = "comment TextureFile ";
 
-/// Reads `vertex`, and `face` or `tristrips`; coordinates are multiplied by `scale`, polygons are
-/// divided into triangles.
+/// Reads `vertex`, and `face` or `tristrips`, with coordinates times `scale` and polygons split
+/// into triangles.
 pub(super) fn read(bytes: &[u8], scale: f64) -> Result<Soup, Syntax> {
     let header = PlyHeader::read(bytes)?;
     let mut body = Body::new(bytes, &header);
@@ -60,11 +60,10 @@ pub(super) fn read(bytes: &[u8], scale: f64) -> Result<Soup, Syntax> {
     Ok(soup)
 }
 
-/// For each name the numbers of the rows, where the file has them.
+/// For each name the numbers of the rows, if the file has them.
 type Columns<const N: usize> = [Option<Vec<f32>>; N];
 
-/// The positions of the vertices, multiplied by `scale`, and the scalar properties `names` of them,
-/// where they are there.
+/// The positions of the vertices, times `scale`, and their available scalar properties `names`.
 pub(super) fn read_columns<const N: usize>(
     bytes: &[u8],
     scale: f64,
@@ -136,7 +135,7 @@ fn vertex_list(element: &Element) -> Result<usize, Syntax> {
     })
 }
 
-/// The vertices that numbers name.
+/// Vertices by their numbers.
 fn vertices(numbers: &[f64], place: FilePlace) -> impl Iterator<Item = Result<u32, Syntax>> {
     numbers.iter().map(move |&number| match number as u32 {
         whole if f64::from(whole) == number => Ok(whole),
@@ -156,10 +155,10 @@ fn strips(numbers: &[f64], place: FilePlace, faces: &mut Vec<[u32; 3]>) -> Resul
     Ok(())
 }
 
-/// Binary little endian, coordinates as double: nothing is rounded. Each column is a property of
-/// the vertices, the texture one of the faces.
+/// Binary little endian, coordinates as double, without rounding. Each column is a property of the
+/// vertices, the texture one of the faces.
 ///
-/// - `ids`: of the vertices, by which the columns are read.
+/// - `ids`: indices of the vertices in the columns.
 pub(super) fn write(
     soup: &Soup,
     ids: &[usize],

@@ -11,7 +11,7 @@ use super::header::{Element, PlyHeader, PlyKind};
 use super::{IMAGE, OF_CORNERS, read, read_vertices, vertex_list, vertices};
 use crate::scalar::Scalar;
 
-/// Names of the colours, as programs write them; the fourth says how opaque they are.
+/// Usual names of the colours; the fourth is opacity.
 const COLOURS: [[&str; 4]; 2] = [
     ["red", "green", "blue", "alpha"],
     [
@@ -21,14 +21,14 @@ const COLOURS: [[&str; 4]; 2] = [
         "diffuse_alpha",
     ],
 ];
-/// … of the texture coordinates of vertices.
+/// Usual names of the texture coordinates of vertices.
 const COORDINATES: [[&str; 2]; 4] = [
     ["s", "t"],
     ["u", "v"],
     ["texture_u", "texture_v"],
     ["texture_s", "texture_t"],
 ];
-/// The triangles as [`read`] has them, and how they look.
+/// The triangles of [`read`] with their appearance.
 #[expect(clippy::too_many_lines)]
 pub(in crate::mesh_file) fn read_painted(bytes: &[u8], scale: f64) -> Result<PaintedSoup, Syntax> {
     let header = PlyHeader::read(bytes)?;
@@ -54,7 +54,7 @@ pub(in crate::mesh_file) fn read_painted(bytes: &[u8], scale: f64) -> Result<Pai
         let kind = name
             .and_then(|name| vertex.scalar(name))
             .map(|column| vertex.properties[column].kind);
-        // 0 to 1 where they are no whole numbers
+        // 0 to 1 unless they are integers
         let full = if matches!(kind, Some(PlyKind::Scalar(Scalar::F32 | Scalar::F64))) {
             255.0
         } else {
@@ -108,7 +108,7 @@ pub(in crate::mesh_file) fn read_painted(bytes: &[u8], scale: f64) -> Result<Pai
     })
 }
 
-/// The body, with all before the element `name` passed over.
+/// The body from the element `name` on.
 fn body_of<'a>(bytes: &'a [u8], header: &PlyHeader, name: &str) -> Result<Body<'a>, Syntax> {
     let mut body = Body::new(bytes, header);
     for element in &header.elements {
@@ -121,8 +121,8 @@ fn body_of<'a>(bytes: &'a [u8], header: &PlyHeader, name: &str) -> Result<Body<'
     Ok(body)
 }
 
-/// Faces with the texture coordinates of their corners: each row once for either list, and once for
-/// the image.
+/// Faces with the texture coordinates of their corners: reads each row once for either list, and
+/// once for the image.
 fn read_corners(
     bytes: &[u8],
     header: &PlyHeader,
@@ -134,7 +134,7 @@ fn read_corners(
     body()?.rows(face, face.count, Some(list), |row, place| {
         polygons.push(vertices(row, place), place)
     })?;
-    // of each triangle its row, and which corners of the polygon it has
+    // row of each triangle, and its corners of the polygon
     let (mut faces, mut places) = (Vec::new(), Vec::new());
     polygons.divide(positions, |row, vertices, triangle| {
         faces.push(triangle.map(|at| vertices[at as usize]));

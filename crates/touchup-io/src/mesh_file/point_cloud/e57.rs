@@ -9,13 +9,13 @@ use super::super::defect::{Defect, Syntax};
 use crate::file_error::FilePlace;
 use touchup_core::mesh::{PointCloud, ScanStation};
 
-/// Whether the file begins as E57 does.
+/// Whether the file begins like E57.
 pub(super) fn is_e57(bytes: &[u8]) -> bool {
     bytes.starts_with(b"ASTM-E57")
 }
 
-/// Reads the points of all scans in the frame of the file, each scan by its pose; coordinates are
-/// multiplied by `scale`. Points that the file calls invalid come out as NaN.
+/// Reads the points of all scans in the frame of the file, each scan by its pose, with coordinates
+/// times `scale`. Invalid points come out as NaN.
 pub(super) fn read(bytes: &[u8], scale: f64) -> Result<PointCloud, Syntax> {
     let foreign = |offset: u64| {
         move |why: e57::Error| Syntax {
@@ -56,8 +56,7 @@ pub(super) fn read(bytes: &[u8], scale: f64) -> Result<PointCloud, Syntax> {
     }
 }
 
-/// Refuses more points than there are bits for; the least that a real scanner takes is some bytes
-/// for each.
+/// Refuses more points than there are bits: real scanners take at least some bytes for each.
 fn check_count(records: u64, offset: u64, len: usize) -> Result<(), Syntax> {
     let needed = u128::from(records).div_ceil(8);
     if needed <= len as u128 {
@@ -75,7 +74,7 @@ fn check_count(records: u64, offset: u64, len: usize) -> Result<(), Syntax> {
     })
 }
 
-/// With what lies behind it, on one line.
+/// The error and its sources, on one line.
 fn defect(error: &e57::Error) -> Defect {
     let mut reason = error.to_string();
     let mut next = std::error::Error::source(error);

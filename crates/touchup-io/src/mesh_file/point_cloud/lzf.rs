@@ -1,8 +1,7 @@
-//! LZF, as PCD files are compressed: runs of literal bytes, and copies of what was written up to 8
-//! KiB before.
+//! LZF, the compression of PCD files: runs of literal bytes, and copies from up to 8 KiB before.
 
-/// The bytes that `packed` stands for; `None` where they are not `len`, or a copy reaches before
-/// their start.
+/// The unpacked bytes of `packed`; `None` for another length than `len`, or a copy from before the
+/// start.
 ///
 /// - `len`: checked against memory by the caller.
 pub(super) fn unpacked(packed: &[u8], len: usize) -> Option<Vec<u8>> {
@@ -26,7 +25,7 @@ pub(super) fn unpacked(packed: &[u8], len: usize) -> Option<Vec<u8>> {
             let count = usize::from(control >> 5) + 2 + more;
             let back = (usize::from(control & 0x1f) << 8) + next()? + 1;
             let from = out.len().checked_sub(back)?;
-            // what is copied may be written by the copy itself
+            // a copy may overlap its own output
             (from..from + count).for_each(|at| out.push(out[at]));
         }
         if out.len() > len {
@@ -36,7 +35,7 @@ pub(super) fn unpacked(packed: &[u8], len: usize) -> Option<Vec<u8>> {
     (out.len() == len).then_some(out)
 }
 
-/// Most bytes that a packed one can stand for: three make a copy of 264.
+/// Maximum expansion of a packed byte: three make a copy of 264.
 pub(super) const MOST_EXPANSION: u64 = 88;
 
 #[cfg(test)]

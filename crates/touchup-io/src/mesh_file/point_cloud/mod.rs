@@ -11,7 +11,7 @@ use super::defect::Syntax;
 use super::unit::MeshUnit;
 use touchup_core::mesh::{PointCloud, ScanStation};
 
-/// The kinds of files that hold nothing but points.
+/// Kinds of files of points alone.
 #[derive(Clone, Copy)]
 pub(super) enum CloudFormat {
     Pcd,
@@ -30,7 +30,7 @@ impl CloudFormat {
         }
     }
 
-    /// From the content of the file, where it is unambiguous.
+    /// Format by unambiguous content.
     pub fn of_content(bytes: &[u8]) -> Option<Self> {
         match bytes {
             _ if e57::is_e57(bytes) => Some(Self::E57),
@@ -51,7 +51,7 @@ impl CloudFormat {
 
 /// The points of a PLY file.
 ///
-/// - `positions`: m; `normals`: of each its three coordinates, where the file has them.
+/// - `positions`: m; `normals`: the three coordinates of each, if the file has them.
 pub(super) fn of_ply(positions: Vec<Point3<f64>>, normals: [Option<Vec<f32>>; 3]) -> PointCloud {
     let normals = match normals {
         [Some(x), Some(y), Some(z)] => {

@@ -9,10 +9,10 @@ use crate::file_error::FilePlace;
 use crate::scalar::Scalar;
 use touchup_core::mesh::{PointCloud, ScanStation};
 
-/// The fields that are read: the place, which there must be, and the normal, which there may be.
+/// Fields for reading: the position, which is required, and the normal, which is optional.
 const NAMES: [&str; 6] = ["x", "y", "z", "normal_x", "normal_y", "normal_z"];
 
-/// How the points are written.
+/// Encoding of the points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Encoding {
     Ascii,
@@ -65,19 +65,19 @@ struct PcdHeader {
     len: usize,
 }
 
-/// Whether the text begins as PCD does.
+/// Whether the text begins like PCD.
 pub(super) fn is_pcd(bytes: &[u8]) -> bool {
     let starts = |word: &[u8]| bytes.starts_with(word);
     starts(b"# .PCD") || starts(b"VERSION ") || starts(b"FIELDS ")
 }
 
-/// Reads places and normals; coordinates are multiplied by `scale`.
+/// Reads positions and normals; coordinates are multiplied by `scale`.
 pub(super) fn read(bytes: &[u8], scale: f64) -> Result<PointCloud, Syntax> {
     let header = PcdHeader::read(bytes)?;
     let columns = header.columns()?;
     let body = &bytes[header.len..];
     let mut cloud = PointCloud::default();
-    // every point takes at least a byte, which is checked before anything is reserved
+    // a check of one byte per point precedes every allocation
     let mut take = |row: [f64; 6], has_normals: bool| {
         cloud
             .positions
@@ -103,7 +103,7 @@ pub(super) fn read(bytes: &[u8], scale: f64) -> Result<PointCloud, Syntax> {
         _ => {
             let body = header.unpacked(body)?;
             let points = header.points as usize;
-            // all values of a field follow one another
+            // the values of a field are contiguous
             let place = |c: Column, at: usize| c.offset * points + at * c.step;
             (0..points).for_each(|at| {
                 take(
@@ -126,16 +126,16 @@ pub(super) fn read(bytes: &[u8], scale: f64) -> Result<PointCloud, Syntax> {
     Ok(cloud)
 }
 
-/// Where a value is in a point.
+/// Place of a value in a point.
 #[derive(Clone, Copy, Debug)]
 struct Column {
-    /// the values before it
+    /// number of values before it
     index: usize,
-    /// the bytes before it
+    /// number of bytes before it
     offset: usize,
     /// bytes of its field
     step: usize,
-    /// `None`: there is none
+    /// `None`: no such field
     scalar: Option<Scalar>,
 }
 
@@ -207,7 +207,7 @@ impl PcdHeader {
         place: FilePlace,
         mut set: impl FnMut(&mut Field, &str) -> Option<()>,
     ) -> Result<(), Syntax> {
-        /// No field of a point is longer than that: a histogram has some hundred values.
+        /// Maximum number of values of a field: a histogram has some hundred.
         const MOST: usize = 1 << 16;
         if words.len() != self.fields.len() {
             return Err(Syntax::unexpected(
@@ -249,7 +249,7 @@ impl PcdHeader {
         }
     }
 
-    /// Where the values of [`NAMES`] are.
+    /// Columns of the values of [`NAMES`].
     fn columns(&self) -> Result<[Column; 6], Syntax> {
         let find = |name: &str| {
             let at = self
@@ -294,8 +294,7 @@ impl PcdHeader {
         self.fields.iter().map(Field::bytes).sum()
     }
 
-    /// Refuses more points than there are bytes for: after this their number may be trusted for
-    /// memory.
+    /// Refuses more points than there are bytes for: afterwards their number is safe for memory.
     fn check_length(&self, left: usize, row: usize) -> Result<(), Syntax> {
         let needed = u128::from(self.points) * row as u128;
         if needed <= left as u128 {

@@ -8,15 +8,15 @@ use crate::file_error::FilePlace;
 use crate::table_rows::DecimalSign;
 use touchup_core::mesh::{PointCloud, ScanStation};
 
-/// Bytes of the shortest line: three digits and what separates them.
+/// Bytes of the shortest line: three digits and their separators.
 const SHORTEST: usize = 6;
-/// How long a normal may be: its digits are rounded.
+/// Length of a normal with rounded digits.
 const UNIT_LENGTH: std::ops::RangeInclusive<f64> = 0.98..=1.02;
 
-/// Reads lines of numbers; coordinates are multiplied by `scale`. The first of them decides what
-/// separates them, the first decimal sign which one all have ([`Notation`]). Lines that begin with
-/// `#`, `//` or a letter, and the number of the points in the first line, are passed over. Columns
-/// 4 to 6, or the last three, are the normals where they are of length 1 in every line.
+/// Reads lines of numbers, with coordinates times `scale`. The first line decides the separator,
+/// the first decimal sign holds for all ([`Notation`]). Skips lines that begin with `#`, `//` or a
+/// letter, and a number of points in the first line. Columns 4 to 6, or the last three, are the
+/// normals if their length is 1 in every line.
 pub(super) fn read(bytes: &[u8], scale: f64) -> Result<PointCloud, Syntax> {
     let end_of_line = if bytes.contains(&b'\n') { b'\n' } else { b'\r' };
     let mut lines = NumberedLines::new(
@@ -80,18 +80,18 @@ pub(super) fn read(bytes: &[u8], scale: f64) -> Result<PointCloud, Syntax> {
     })
 }
 
-/// How a file writes its numbers, in all of its lines.
+/// Notation of the numbers in all lines of a file.
 struct Notation {
     /// `None`: blanks
     separator: Option<char>,
     decimal_sign: DecimalSign,
-    /// commas between whole numbers, as many as decimals would make
+    /// commas between whole numbers, consistent with decimal commas
     may_be_decimals: bool,
 }
 
 impl Notation {
-    /// By the first line of numbers: semicolons separate; commas do, but not those within at least
-    /// three words, one in each at the most.
+    /// Notation by the first line of numbers: semicolons separate; commas do too, unless they occur
+    /// at most once within each of three or more words.
     fn of(line: &str) -> Self {
         let has_decimals = |word: &str| {
             word.matches(',').count() < 2 && !word.starts_with(',') && !word.ends_with(',')
@@ -110,7 +110,7 @@ impl Notation {
         }
     }
 
-    /// The numbers of a line; or what was expected, and found.
+    /// The numbers of a line; or the expected and the found text.
     fn numbers<'a>(
         &mut self,
         line: &'a str,
@@ -142,7 +142,7 @@ impl Notation {
             .decimal_sign
             .with_point(word)
             .ok_or(("the decimal sign of the lines before", word))?;
-        // what follows a decimal sign may begin with a zero
+        // digits after a decimal sign may begin with a zero
         let digits = word.trim_start_matches(['+', '-']).as_bytes();
         if self.separator == Some(',') && matches!(digits, [b'0', b'0'..=b'9', ..]) {
             return Err((DECIDED, word));
@@ -151,11 +151,11 @@ impl Notation {
     }
 }
 
-/// What is expected where a comma may be either.
+/// Expected notation, for errors about ambiguous commas.
 const DECIDED: &str = "numbers with decimal points, or with decimal commas and separated by \
      semicolons or blanks";
 
-/// A line that is none of numbers; "nan" and "inf" are numbers.
+/// A line without numbers; "nan" and "inf" are numbers.
 fn is_comment(line: &str) -> bool {
     let word = line
         .trim_start_matches(['"', '\''])
@@ -167,7 +167,7 @@ fn is_comment(line: &str) -> bool {
     line.starts_with(['#', '/', '%', '!']) || !is_number
 }
 
-/// The normals of all lines so far, where each line had one there.
+/// The normals of all lines up to now, if each line has one there.
 struct Normals {
     after_xyz: Option<Vec<Vector3<f64>>>,
     at_end: Option<Vec<Vector3<f64>>>,
@@ -182,7 +182,7 @@ impl Normals {
         for (normals, start) in starts {
             let normal = row.get(start..start + 3).map(Vector3::from_row_slice);
             match (normal, &mut *normals) {
-                // a point without a place may be without a normal
+                // a point without a position may lack a normal
                 (Some(n), Some(found))
                     if UNIT_LENGTH.contains(&n.norm()) || !n.norm().is_finite() =>
                 {

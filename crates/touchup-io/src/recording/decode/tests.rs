@@ -244,7 +244,7 @@ fn a_state_of_a_franka_gives_the_tool_and_the_wrench_in_the_base() {
         (force, torque),
         (Vector3::new(1.0, 2.0, 3.0), Vector3::new(4.0, 5.0, 6.0))
     );
-    // a release with one number more is not read as if it had none
+    // a release with one number more must not read as if it had none
     assert!(decode(format, &[&head[..], &[0; 8], &ros1, &[0; 75]].concat(), 0).is_err());
     assert!(decode(format, &whole[..whole.len() - 75], 0).is_err());
 }
@@ -280,8 +280,8 @@ fn what_gives_no_pose_is_refused_with_what_does_and_the_flag() {
     assert!(why.contains("--pose-frame"), "{why}");
 }
 
-/// What a library unpacks in either byte order gives what the bytes themselves give, bit by bit,
-/// and ends where they end.
+/// A library's unpacking in either byte order agrees with the bytes themselves, bit by bit, and
+/// ends at the same place.
 #[test]
 fn fields_that_a_deserializer_hands_out_are_those_of_the_bytes() {
     for order in [0, 1] {
@@ -310,8 +310,7 @@ fn fields_that_a_deserializer_hands_out_are_those_of_the_bytes() {
     }
 }
 
-/// Of every type, whatever the bytes are: drawn at random, and zeros, which are whole messages of
-/// some length.
+/// For every type and any bytes: random ones, and zeros, which are whole messages of some length.
 #[test]
 fn no_bytes_are_read_otherwise_by_a_deserializer() {
     let mut state = 1_u64;
@@ -364,7 +363,7 @@ fn no_bytes_are_read_otherwise_by_a_deserializer() {
                         format!("{:?}", message.decode(&bytes, 7)),
                         "{name}, {len} bytes"
                     );
-                    // a quaternion of zeros is none, and comes in the midst of a message
+                    // a quaternion of zeros is invalid, and comes in the midst of a message
                     whole += u64::from(live.is_ok() || live == Err(BadMessage::Quaternion));
                 }
             }

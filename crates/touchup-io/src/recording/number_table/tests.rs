@@ -203,7 +203,7 @@ fn tables_with_a_bad_line_are_refused_with_its_number() {
     );
 }
 
-/// As a spreadsheet saves it where decimals have a comma.
+/// As saved by a spreadsheet with decimal commas.
 #[test]
 fn a_table_has_one_decimal_sign_and_may_have_quotation_marks() {
     let header = "\u{feff}\"t_s\";\"x, of the tip [mm]\";y_mm;z_mm;fx_n;fy_n;fz_n\r\n";

@@ -1,4 +1,4 @@
-//! What is looked up in a recording before it is read.
+//! Survey of a recording before reading.
 
 use super::super::decode::Decoded;
 use super::super::intake::decode_raw;
@@ -34,7 +34,7 @@ impl RecordingReader {
         }
     }
 
-    /// The tree of transforms as far as it is needed; of what is damaged, what comes before.
+    /// The needed part of the tree of transforms; up to the damage of a damaged file.
     pub(super) fn read_tree(mut self, frames: &TransformFrames) -> TransformTree {
         let mut tree = TransformTree::default();
         while !tree.is_enough(frames)
