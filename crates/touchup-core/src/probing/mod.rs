@@ -1,4 +1,4 @@
-//! An arm that touches flagged features by itself.
+//! Probing of flagged features by an arm.
 
 pub mod arm;
 pub mod execute;

@@ -1,4 +1,4 @@
-//! The room that an arm takes up: capsules along its links.
+//! Bodies of an arm: capsules along its links.
 
 use std::sync::Arc;
 
@@ -10,7 +10,7 @@ use super::joints::Joints;
 use super::kinematics::UrGeometry;
 use super::serial_chain::SerialChain;
 
-/// A link of an arm, by the name that its maker gives it.
+/// A link of an arm, by its maker's name.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Link {
     /// on the floor
@@ -25,21 +25,21 @@ pub enum Link {
     /// from the forearm to the second joint of the wrist
     #[error("first link of the wrist")]
     Wrist1,
-    /// to the third
+    /// from the second to the third joint of the wrist
     #[error("second link of the wrist")]
     Wrist2,
-    /// to the flange
+    /// from the third joint of the wrist to the flange
     #[error("third link of the wrist")]
     Wrist3,
     /// from the flange to the tip
     #[error("probe")]
     Probe,
-    /// of an arm that is no UR
+    /// a link of any other arm than a UR
     #[error("link {0}")]
     Named(Arc<str>),
 }
 
-/// The links of a UR, from the base outward.
+/// Links of a UR, from the base outward.
 const UR_LINKS: [Link; 7] = [
     Link::Base,
     Link::UpperArm,
@@ -50,8 +50,8 @@ const UR_LINKS: [Link; 7] = [
     Link::Probe,
 ];
 
-/// Pairs of them that may collide, by their numbers; those that share a joint, or lie side by side
-/// whatever the joints are, cannot.
+/// Pairs of UR links that may collide, by number; links that share a joint, or lie side by side at
+/// all joint angles, cannot.
 const UR_MEETING: [(usize, usize); 11] = [
     (0, 2),
     (0, 3),
@@ -66,17 +66,17 @@ const UR_MEETING: [(usize, usize); 11] = [
     (2, 6),
 ];
 
-/// The links of an arm at some joint angles, in the base B.
+/// Links of an arm at given joint angles, in the base B.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ArmBodies<'a> {
     links: Vec<(Link, Capsule)>,
-    /// pairs that may collide, by their numbers
+    /// pairs that may collide, by number
     meeting: &'a [(usize, usize)],
 }
 
 impl<'a> ArmBodies<'a> {
-    /// - `pose_ft`: the tip in the flange. The probe is the line between them: how thick it is the
-    ///   margin of a check has to hold.
+    /// - `pose_ft`: the tip in the flange. The probe is the line between them; the margin of a
+    ///   check has to hold its thickness.
     pub fn new(geometry: &'a ArmGeometry, joints: &Joints, pose_ft: &Isometry3<f64>) -> Self {
         match geometry {
             ArmGeometry::Ur(ur) => Self {
@@ -90,12 +90,12 @@ impl<'a> ArmBodies<'a> {
         }
     }
 
-    /// All of them, from the base outward.
+    /// Links and capsules, from the base outward.
     pub fn links(&self) -> impl Iterator<Item = (&Link, &Capsule)> {
         self.links.iter().map(|(link, capsule)| (link, capsule))
     }
 
-    /// The pair of links with the smallest gap, m, of those that may collide.
+    /// Pair of links with the smallest gap, m, among those that may collide.
     pub fn nearest_pair(&self) -> (Link, Link, f64) {
         let gap = |&(one, other): &(usize, usize)| {
             (one, other, self.links[one].1.gap(&self.links[other].1))
@@ -113,7 +113,7 @@ impl<'a> ArmBodies<'a> {
 fn of_ur(ur: &UrGeometry, joints: &[f64; 6], pose_ft: &Isometry3<f64>) -> Vec<(Link, Capsule)> {
     let poses = ur.link_poses(joints);
     let joint = |number: usize| poses[number].translation.vector;
-    // along the axes of shoulder, elbow and first wrist, which are parallel
+    // along the parallel axes of shoulder, elbow and first wrist
     let across = poses[0].rotation * Vector3::z();
     let [upper, fore] = [ur.upper_arm_beside, ur.forearm_beside].map(|by| across * by);
     let tip = (poses[5] * pose_ft).translation.vector;
@@ -134,7 +134,7 @@ fn of_ur(ur: &UrGeometry, joints: &[f64; 6], pose_ft: &Isometry3<f64>) -> Vec<(L
     UR_LINKS.into_iter().zip(capsules).collect()
 }
 
-/// The first is what the arm stands on, the last the probe.
+/// Links of a chain: the first carries the arm, the last is the probe.
 fn of_chain(
     chain: &SerialChain,
     joints: &Joints,
@@ -154,8 +154,8 @@ fn of_chain(
 mod tests {
     use super::*;
 
-    /// The upper arm is upright. With the forearm at a right angle nothing is near anything; folded
-    /// down it is in the base's column, as forearm and upper arm are nearly as long as each other.
+    /// The upper arm is upright. With the forearm at a right angle all links are clear; folded down
+    /// it is in the base's column, as forearm and upper arm are nearly equally long.
     #[test]
     fn a_stretched_arm_is_free_and_one_folded_onto_itself_is_not() {
         let probe = Isometry3::translation(0.0, 0.0, 0.15);

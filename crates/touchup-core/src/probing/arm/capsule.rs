@@ -1,23 +1,23 @@
-//! Capsules, which stand for the links of an arm.
+//! Capsules as bodies of the links of an arm.
 
 use nalgebra::{Isometry3, Point3};
 
 /// All points within a radius of a segment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Capsule {
-    /// the ends of the segment, m
+    /// ends of the segment, m
     pub ends: [Point3<f64>; 2],
-    /// m
+    /// distance of the surface from the segment, m
     pub radius: f64,
 }
 
 impl Capsule {
-    /// Gap between two capsules, m; negative: they overlap.
+    /// Gap between two capsules, m; negative if they overlap.
     pub fn gap(&self, other: &Self) -> f64 {
         segment_distance(&self.ends, &other.ends) - self.radius - other.radius
     }
 
-    /// The same capsule where its frame has a pose.
+    /// The capsule at a pose of its frame.
     pub(super) fn moved(&self, pose: &Isometry3<f64>) -> Self {
         Self {
             ends: self.ends.map(|end| pose * end),
@@ -28,8 +28,8 @@ impl Capsule {
 
 /// Smallest distance between two segments, m.
 ///
-/// The squared distance is convex in the two shares of the way along them: its smallest value is
-/// inside, where both derivatives are zero, or on the border, where one share is 0 or 1.
+/// The squared distance is convex in the two shares along the segments: its minimum is inside, with
+/// both derivatives zero, or on the border, with one share 0 or 1.
 fn segment_distance([a, b]: &[Point3<f64>; 2], [c, d]: &[Point3<f64>; 2]) -> f64 {
     let (u, v, w) = (b - a, d - c, a - c);
     let (uu, uv, vv) = (u.dot(&u), u.dot(&v), v.dot(&v));
@@ -50,7 +50,7 @@ fn segment_distance([a, b]: &[Point3<f64>; 2], [c, d]: &[Point3<f64>; 2]) -> f64
         .fold(f64::INFINITY, f64::min)
 }
 
-/// Sine² of an angle below which two segments are parallel: then an end of one of them is nearest.
+/// Sine² of the angle below which two segments are parallel: then an end of one is nearest.
 const PARALLEL: f64 = 1e-12;
 
 fn point_distance(point: &Point3<f64>, [from, to]: [&Point3<f64>; 2]) -> f64 {

@@ -1,24 +1,24 @@
-//! Whether an order follows the newest state of the arm.
+//! Check that an order follows the newest state of the arm.
 //!
-//! A caller that was held up finds states that waited. What it orders by them would follow a place
-//! and a force of the past: such an order is not sent, and where none is sent the child brakes.
-//! Once the caller has taken what waited its orders go out again.
+//! A delayed caller finds queued states. Orders by them would follow a past position and force:
+//! they stay unsent, and without orders the child brakes. Orders go out again once the caller has
+//! taken the queue.
 
 use super::interface::ArmError;
 
-/// The state that an order follows may be older than the newest by so many periods of the arm …
+/// Maximum age of the followed state relative to the newest, in periods of the arm.
 const OLD: f64 = 2.0;
-/// … and by the rounding of stamps, s.
+/// Rounding of stamps, added to this age, s.
 const ROUNDING: f64 = 0.5e-3;
-/// A caller that does not catch up within this time is too slow for the arm, s.
+/// Maximum duration of a lag, s: a caller that does not catch up is too slow for the arm.
 const CATCHES_UP: f64 = 0.2;
 
-/// How long a caller has been behind the arm.
+/// Lag of a caller behind the arm.
 #[derive(Clone, Copy, Debug)]
 pub struct Freshness {
-    /// an order may follow a state that is so much older than the newest, s
+    /// maximum age of the followed state relative to the newest, s
     old: f64,
-    /// stamp of the newest state at the first order that was not sent, s
+    /// stamp of the newest state at the first unsent order, s
     behind_since_s: Option<f64>,
 }
 
@@ -33,8 +33,8 @@ impl Freshness {
 
     /// Whether an order may go out.
     ///
-    /// - `followed_s`: stamp of the state that it follows; `newest_s`: of the newest that has come,
-    ///   s; `late_s`: how late that came, s.
+    /// - `followed_s`: stamp of the state that the order follows; `newest_s`: stamp of the newest
+    ///   state, s; `late_s`: its delay, s.
     ///
     /// # Errors
     /// [`ArmError::Behind`] for a caller that does not catch up.
@@ -61,15 +61,14 @@ impl Freshness {
 mod tests {
     use super::*;
 
-    /// The orders of a caller that takes one state each so many ms from an arm that makes one each
-    /// 2 ms; it was held up for so long, ms, at the beginning. Of each order: when, ms, whether it
-    /// went out.
+    /// Orders of a caller that takes one state per cycle from an arm with one state per 2 ms, after
+    /// an initial delay: time of each order, ms, and whether it went out.
     fn orders(held_ms: u64, cycle_us: u64) -> (Vec<(f64, bool)>, Option<ArmError>) {
         let (mut freshness, mut orders, mut followed_s) = (Freshness::new(2e-3), Vec::new(), 0.0);
         let mut now_us = held_ms * 1000;
         while now_us < 1_000_000 {
             let newest_s = (now_us / 2000) as f64 * 2e-3;
-            // with none that waits it waits for the next
+            // an up-to-date caller waits for the next state
             followed_s = f64::min(followed_s + 2e-3, newest_s.max(followed_s));
             match freshness.may_send(followed_s, (newest_s, 0.0)) {
                 Ok(went) => orders.push((now_us as f64 * 1e-3, went)),
@@ -86,8 +85,8 @@ mod tests {
         assert!(error.is_none() && orders.len() == 500 && orders.iter().all(|(_, went)| *went));
     }
 
-    /// 50 ms are 25 states; at a tenth of a millisecond for each they are taken within 2.5 ms, in
-    /// which one more comes.
+    /// 50 ms are 25 states; at a tenth of a millisecond each the caller takes them within 2.5 ms,
+    /// in which one more comes.
     #[test]
     fn a_caller_that_was_held_for_50_ms_orders_nothing_until_it_has_caught_up() {
         let (orders, error) = orders(50, 100);
@@ -102,7 +101,7 @@ mod tests {
         );
     }
 
-    /// Each 3 ms one state of 2 ms is taken: 4 ms behind after some 15 ms, and never again nearer.
+    /// One state of 2 ms per 3 ms: the caller is 4 ms behind after some 15 ms, and never nearer.
     #[test]
     fn a_caller_that_is_slower_than_the_arm_orders_nothing_more_and_is_named() {
         let (orders, error) = orders(0, 3000);

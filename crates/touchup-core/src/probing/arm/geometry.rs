@@ -1,4 +1,4 @@
-//! Which arm it is: how its joints move the flange, and which joints bring it somewhere.
+//! Geometry of an arm: pose of the flange by its joints, and joints of a pose.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -9,12 +9,12 @@ use super::joints::{Joints, largest_turn};
 use super::kinematics::UrGeometry;
 use super::serial_chain::{Jacobian, SerialChain, Unreached, shortest};
 
-/// The geometry of an arm.
+/// Geometry of an arm.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ArmGeometry {
     /// A UR, with its inverse in closed form.
     Ur(UrGeometry),
-    /// Any other, with a search for its inverse.
+    /// Any other arm, with a search for its inverse.
     Chain(Arc<SerialChain>),
 }
 
@@ -30,13 +30,13 @@ impl From<SerialChain> for ArmGeometry {
     }
 }
 
-/// A joint of a UR turns by no more from its zero, rad.
+/// Maximum turn of a UR joint from its zero, rad.
 const JOINT_RANGE: f64 = TAU;
-/// About this configuration a UR is folded, rad: joints are chosen within half a turn of it.
+/// Folded configuration of a UR, rad: the inverse chooses joints within half a turn of it.
 const FOLDED: [f64; 6] = [0.0, -1.6, 1.6, -1.6, -1.6, 0.0];
 
 impl ArmGeometry {
-    /// How many joints it has.
+    /// Number of joints.
     pub fn joint_count(&self) -> usize {
         match self {
             Self::Ur(_) => 6,
@@ -47,7 +47,7 @@ impl ArmGeometry {
     /// Pose of the flange in the base B.
     ///
     /// # Panics
-    /// As all calls with joints, for another number of them than it has.
+    /// For a number of joints other than the arm's, as all calls with joints.
     pub fn flange(&self, joints: &Joints) -> Isometry3<f64> {
         match self {
             Self::Ur(ur) => ur.flange(six(joints)),
@@ -55,7 +55,7 @@ impl ArmGeometry {
         }
     }
 
-    /// Velocity of the flange by those of the joints, in B.
+    /// Velocity of the flange by the joint velocities, in B.
     pub fn jacobian(&self, joints: &Joints) -> Jacobian {
         match self {
             Self::Ur(ur) => {
@@ -69,8 +69,8 @@ impl ArmGeometry {
         }
     }
 
-    /// Distance of the arm from a singularity: the smallest singular value of its Jacobian, with
-    /// lengths in units of the arm's own.
+    /// Distance from a singularity: the smallest singular value of the Jacobian, lengths in units
+    /// of the arm's own.
     pub fn dexterity(&self, joints: &Joints) -> f64 {
         match self {
             Self::Ur(ur) => ur.dexterity(six(joints)),
@@ -78,8 +78,7 @@ impl ArmGeometry {
         }
     }
 
-    /// The slowest turning of the joints that moves the flange with a velocity, rad/s; `None` where
-    /// none does.
+    /// Slowest joint velocities for a velocity of the flange, rad/s; `None` if there are none.
     ///
     /// - `linear`, `angular`: of the flange, m/s and rad/s in B.
     pub fn turning(
@@ -96,7 +95,7 @@ impl ArmGeometry {
             .filter(|rates| rates.iter().all(|rate| rate.is_finite()))
     }
 
-    /// Joint angles within their ranges that bring the flange to a pose in B, nearest to others.
+    /// Joint angles within their ranges that bring the flange to a pose in B, nearest to `near`.
     ///
     /// # Errors
     /// [`Unreached`]
@@ -115,9 +114,8 @@ impl ArmGeometry {
         }
     }
 
-    /// The joint angles that bring the flange to a pose in B and leave the arm most room to move:
-    /// where one begins that exists in a plan or a simulation alone. `None` where it does not
-    /// reach.
+    /// Joint angles that bring the flange to a pose in B with the largest dexterity: the start of
+    /// an arm that exists only in a plan or a simulation. `None` out of reach.
     pub fn most_dexterous(&self, pose_bf: &Isometry3<f64>) -> Option<Joints> {
         match self {
             Self::Ur(ur) => {
@@ -131,13 +129,13 @@ impl ArmGeometry {
     }
 }
 
-/// The joints of a UR.
+/// The six joints of a UR.
 pub(super) fn six(joints: &Joints) -> &[f64; 6] {
     <&[f64; 6]>::try_from(&**joints)
         .expect("whoever has another arm has another geometry: `Limits::check_pose` looks")
 }
 
-/// The same angles, each within half a turn of another.
+/// The same angles, each within half a turn of `near`.
 fn unwound(joints: &Joints, near: &Joints) -> Joints {
     joints.mapped(|joint, angle| angle + TAU * ((near[joint] - angle) / TAU).round())
 }

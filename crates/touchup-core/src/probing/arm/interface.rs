@@ -1,36 +1,36 @@
-//! What probing needs of an arm: its state at a steady rate, and a few motions that can be broken
-//! off at any moment.
+//! Interface of an arm for probing: its state at a steady rate, and a few motions that can end at
+//! any moment.
 //!
-//! No motion blocks. The caller asks for the next state, checks it, and goes on or stops; so the
-//! same loop drives a simulated arm in its own time and a real one at 500 Hz, and a stop is never
-//! behind a motion in a queue.
+//! No motion blocks. The caller requests the next state, checks it, and goes on or stops; so the
+//! same loop drives a simulated arm in its own time and a real one at 500 Hz, and a stop never
+//! waits behind a motion in a queue.
 
 use nalgebra::{Isometry3, Vector3};
 
 use super::joints::Joints;
 use crate::stylus::{StampedPose, StampedWrench, Wrench};
 
-/// What an arm says of itself at one moment.
+/// State of an arm at one moment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ArmState {
-    /// of the controller's clock, ns
+    /// by the controller's clock, ns
     pub stamp_ns: i64,
-    /// of the probe's tip, origin in the centre of its ball, in the base B; of an arm that does not
+    /// tip of the probe in the base B, origin in the centre of its ball, for an arm that does not
     /// bend
     pub pose_bt: Isometry3<f64>,
-    /// what the part does to the tip, in the axes of B about the centre of the ball; weight is off
+    /// wrench of the part on the tip, in the axes of B about the centre of the ball; without weight
     pub wrench_b: Wrench,
-    /// what the sensor of the arm has: contact, weight and bias, in the axes of the flange F about
+    /// raw wrench of the arm's sensor: contact, weight and bias, in the axes of the flange F about
     /// its origin
     pub raw_wrench_f: Wrench,
-    /// rad
+    /// joint angles, rad
     pub joints: Joints,
-    /// whether and why it is stopped
+    /// safety state: a stop and its cause
     pub safety: Safety,
 }
 
 impl ArmState {
-    /// What a probe measures at this moment: its pose in B, and the wrench in its own axes, as its
+    /// Measurement of a probe at this moment: its pose in B, and the wrench in its own axes, as its
     /// sensor would have it.
     ///
     /// - `stamp_ns`: of both.
@@ -50,68 +50,67 @@ impl ArmState {
     }
 }
 
-/// What the safety system of an arm says.
+/// State of an arm's safety system.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, thiserror::Error)]
 pub enum Safety {
-    /// It may move.
+    /// The arm may move.
     #[default]
     #[error("nothing stops it")]
     Normal,
-    /// It stopped by itself: force, speed or a plane.
+    /// The arm stopped by itself: force, speed or a plane.
     #[error("protective stop (force, speed or a safety plane): look, then recover")]
     ProtectiveStop,
-    /// The emergency stop button was pressed, or a door opened.
+    /// An operator's stop: emergency stop button, or an open door.
     #[error("stopped by the operator (button or door): release it, then recover")]
     OperatorStop,
-    /// A fault that takes more than a call to be cleared.
+    /// A fault that no call can clear.
     #[error("its controller reports a fault: look at its panel")]
     Fault,
 }
 
-/// A command to an arm; each replaces the one before.
+/// A command to an arm; it replaces the one before.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Command {
-    /// Straight to a pose of the tip in B, and to a stop there.
+    /// Straight to a pose of the tip in B, with a stop there.
     Line {
-        /// where the tip is then, in B
+        /// end pose of the tip, in B
         to: Isometry3<f64>,
-        /// m/s
+        /// speed, m/s
         speed: f64,
-        /// m/s²
+        /// acceleration, m/s²
         acceleration: f64,
     },
-    /// On and on with a velocity of the tip, m/s in B, without turning. It ends with the next
-    /// command.
+    /// Motion of the tip with a velocity, m/s in B, without turning, until the next command.
     Velocity {
-        /// m/s in B
+        /// velocity, m/s in B
         linear: Vector3<f64>,
-        /// m/s²
+        /// acceleration, m/s²
         acceleration: f64,
     },
-    /// Presses along an axis with a force and goes across it with a velocity.
+    /// Presses along an axis with a force and moves across it with a velocity.
     Press {
         /// unit vector in B, into the part
         axis: Vector3<f64>,
-        /// N, what the arm does to the part
+        /// force of the arm on the part, N
         force: f64,
-        /// across the axis, m/s in B
+        /// velocity across the axis, m/s in B
         feed: Vector3<f64>,
         /// largest speed along the axis, m/s
         speed: f64,
     },
-    /// To a stop.
+    /// Brakes to a stop.
     Stop {
-        /// m/s²
+        /// deceleration, m/s²
         deceleration: f64,
     },
 }
 
-/// What makes an arm slower than it is ordered to be.
+/// Causes that slow an arm below its ordered speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Slowed {
-    /// of the speed slider, %
+    /// setting of the speed slider, %
     pub slider_percent: f64,
-    /// whether its safety system is in reduced mode
+    /// whether the safety system is in reduced mode
     pub is_reduced: bool,
 }
 
@@ -135,20 +134,20 @@ impl std::fmt::Display for Slowed {
 /// Why an arm does not execute a command.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ArmError {
-    /// No states arrive from it.
+    /// No states arrive from the arm.
     #[error(
         "nothing has come from the arm for {silent_ms} ms: look at its controller and at the cable"
     )]
     Lost {
-        /// ms
+        /// duration of silence, ms
         silent_ms: u64,
     },
-    /// It has closed a connection.
+    /// The arm has closed a connection.
     #[error(
         "the connection for {what} was closed from the arm's side: look at its controller and at the cable"
     )]
     Dropped {
-        /// what it was for
+        /// purpose of the connection
         what: &'static str,
     },
     /// The states come with equal stamps.
@@ -159,135 +158,134 @@ pub enum ArmError {
         "the arm's clock went back by {back_ms:.0} ms: its controller has started again, or two arms answer"
     )]
     WentBack {
-        /// ms
+        /// step back, ms
         back_ms: f64,
     },
-    /// Who commands it is slower than its states.
+    /// The commanding program is slower than the states of the arm.
     #[error(
         "touchup is {age_ms:.0} ms behind the states of the arm and does not catch up, so the arm was left to brake: end what else runs on this machine"
     )]
     Behind {
-        /// of the state that the last order would have followed, ms
+        /// age of the state that the last order would have followed, ms
         age_ms: f64,
     },
-    /// It is not allowed to move.
+    /// The arm may not move.
     #[error("the arm is stopped: {safety}")]
     Stopped {
-        /// why
+        /// cause of the stop
         safety: Safety,
     },
-    /// What it runs for us has ended, and no safety system says why.
+    /// The program on the controller has ended, and no safety system says why.
     #[error(
         "the program on the arm's controller has ended, at its panel, by its watchdog or by another client: look, then recover"
     )]
     ProgramEnded,
-    /// What it runs for us was paused; it was ended then, so that nothing goes on when somebody
-    /// resumes it.
+    /// The program on the controller was paused, and then ended so that a resume moves nothing.
     #[error(
         "the program on the arm's controller was paused, at its panel or by a safeguard, and ended then, so that nothing goes on by \
          itself: look, then recover"
     )]
     ProgramPaused,
-    /// What it runs for us counts its cycles no more; it was stopped by other means.
+    /// The program on the controller no longer counts its cycles; other means stopped the arm.
     #[error(
         "the program on the arm's controller hangs, or another runs in its place: it has counted no cycle for {silent_ms:.0} ms, where each \
          takes {cycle_ms:.0} ms; the arm was stopped: look, then recover"
     )]
     ProgramHangs {
-        /// since its last cycle, by the stamps of the states, ms
+        /// time since its last cycle, by the stamps of the states, ms
         silent_ms: f64,
-        /// of the controller, ms
+        /// cycle of the controller, ms
         cycle_ms: f64,
     },
-    /// It does not do what it is ordered to; it was stopped by other means.
+    /// The arm does not follow its orders; other means stopped it.
     #[error(
         "the arm moves with {mm_per_s:.0} mm/s and {deg_per_s:.0}°/s where {ordered_mm_per_s:.0} mm/s are ordered: its program hangs, or \
          somebody else commands it; it was stopped: look, then recover"
     )]
     Disobeys {
-        /// of the tip, mm/s
+        /// speed of the tip, mm/s
         mm_per_s: f64,
-        /// by the order, mm/s
+        /// ordered speed of the tip, mm/s
         ordered_mm_per_s: f64,
-        /// of its turning, °/s
+        /// turn rate of the tip, °/s
         deg_per_s: f64,
     },
-    /// One of the topics that its state comes on is silent, or old.
+    /// A topic of the arm's state is silent, or old.
     #[error(
         "{topic} brings nothing new for {silent_ms:.0} ms: is its broadcaster active (`ros2 control list_controllers`), and the network up?"
     )]
     TopicSilent {
-        /// its name
+        /// name of the topic
         topic: String,
-        /// ms
+        /// duration of silence, ms
         silent_ms: f64,
     },
-    /// The stamps go on faster than time.
+    /// The stamps run faster than time.
     #[error(
         "the stamps of {topic} jumped ahead by {ahead_ms:.0} ms: its clock was set, or two senders answer"
     )]
     JumpedAhead {
-        /// its name
+        /// name of the topic
         topic: String,
-        /// ms
+        /// jump ahead, ms
         ahead_ms: f64,
     },
-    /// States come later than they did.
+    /// States come later than before.
     #[error(
         "{topic} comes {late_ms:.0} ms later than it did: the network, the controller or this machine is busy"
     )]
     Late {
-        /// its name
+        /// name of the topic
         topic: String,
-        /// ms
+        /// delay, ms
         late_ms: f64,
     },
-    /// A message of the arm that cannot be its own.
+    /// A message that cannot come from this arm.
     #[error("{topic}: {reason}")]
     Unreadable {
-        /// its name
+        /// name of the topic
         topic: String,
-        /// what is wrong with it, and what to do
+        /// defect of the message, and remedy
         reason: String,
     },
-    /// It stands though it is ordered to move.
+    /// The arm stands still against its orders.
     #[error(
         "the arm has moved {moved_deg:.2}° where {ordered_deg:.2}° were ordered: is the controller of {topic} active (`ros2 control \
          list_controllers`), and does it take velocities (docs/ros2_control.md)?"
     )]
     Ignores {
-        /// where orders go
+        /// topic of the orders
         topic: String,
-        /// way of the joints by the orders, °
+        /// ordered travel of the joints, °
         ordered_deg: f64,
-        /// way of the joints as measured, °
+        /// measured travel of the joints, °
         moved_deg: f64,
     },
-    /// It was ordered to stop and goes on.
+    /// The arm moves on after an order to stop.
     #[error(
         "the arm still moves with {mm_per_s:.0} mm/s after it was ordered to stop ({first}), and there is no other way to stop it from \
          here: press its emergency stop, then look what else commands it"
     )]
     GoesOn {
-        /// of the tip, mm/s
+        /// speed of the tip, mm/s
         mm_per_s: f64,
-        /// why it was ordered to stop
+        /// reason for the order to stop
         first: String,
     },
-    /// The connection to the arm has failed; the arm was stopped by other means.
+    /// The connection to the arm has failed; other means stopped the arm.
     #[error(
         "the program that speaks to the arm {reason}; the arm was stopped without it: look, then recover"
     )]
     Client {
-        /// what happened to it
+        /// failure of the connecting program
         reason: String,
     },
-    /// It does not support the command.
+    /// The arm does not support the command.
     #[error("the arm refuses {what}: {reason}")]
     Refused {
         /// the command
         what: &'static str,
-        /// why
+        /// reason
         reason: String,
     },
 }
@@ -300,19 +298,19 @@ pub trait Arm {
     /// [`ArmError::Lost`], [`ArmError::Stale`].
     fn next_state(&mut self) -> Result<ArmState, ArmError>;
 
-    /// Begins a motion, instead of the one before.
+    /// Begins a motion, in place of the one before.
     ///
     /// # Errors
     /// [`ArmError::Refused`], [`ArmError::Lost`].
     fn command(&mut self, command: &Command) -> Result<(), ArmError>;
 
-    /// Zeroes the sensor. To be called at rest in free air.
+    /// Zeroes the sensor. Call it at rest in free air.
     ///
     /// # Errors
     /// As [`Self::command`].
     fn zero_sensor(&mut self) -> Result<(), ArmError>;
 
-    /// Lets it move again after a protective stop, once an operator has looked. Nothing else calls
+    /// Allows motion again after a protective stop, once an operator has looked. Nothing else calls
     /// it, and it moves nothing.
     ///
     /// # Errors
@@ -322,7 +320,7 @@ pub trait Arm {
     /// Time between two states, s.
     fn period(&self) -> f64;
 
-    /// What makes it slower than it is ordered to be, as far as it says so.
+    /// Causes that slow the arm below its ordered speed, if it reports them.
     fn slowed(&self) -> Option<Slowed> {
         None
     }
@@ -333,7 +331,7 @@ mod tests {
     use super::*;
     use nalgebra::UnitQuaternion;
 
-    /// Turned by a quarter about z, x of the base is −y of the probe.
+    /// After a quarter turn about z, x of the base is −y of the probe.
     #[test]
     fn a_wrench_in_the_base_is_felt_in_the_axes_of_the_probe() {
         let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), std::f64::consts::FRAC_PI_2);

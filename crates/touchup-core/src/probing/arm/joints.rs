@@ -3,10 +3,10 @@
 use std::fmt;
 use std::ops::{Deref, DerefMut};
 
-/// An arm has at most so many joints.
+/// Maximum number of joints.
 pub const MOST_JOINTS: usize = 8;
 
-/// Joint angles from the base to the wrist, rad; [`MOST_JOINTS`] at most, kept in place.
+/// Joint angles from the base to the wrist, rad; up to [`MOST_JOINTS`], stored in place.
 #[derive(Clone, Copy)]
 pub struct Joints {
     /// zero from `count` on
@@ -15,7 +15,7 @@ pub struct Joints {
 }
 
 impl Joints {
-    /// The angles of so many joints; `None` for more than [`MOST_JOINTS`].
+    /// Joints with these angles; `None` for more than [`MOST_JOINTS`].
     pub fn of(angles: &[f64]) -> Option<Self> {
         let mut joints = Self {
             angles: [0.0; MOST_JOINTS],
@@ -28,7 +28,7 @@ impl Joints {
         Some(joints)
     }
 
-    /// Each angle changed by its number, from 0 on at the base.
+    /// Maps each angle, with the number of its joint from 0 at the base.
     pub fn mapped(mut self, mut angle: impl FnMut(usize, f64) -> f64) -> Self {
         self.iter_mut()
             .enumerate()
@@ -72,7 +72,7 @@ impl fmt::Debug for Joints {
     }
 }
 
-/// By how far the joint turns that turns most, rad.
+/// Largest turn of one joint between two configurations, rad.
 pub(crate) fn largest_turn(from: &Joints, to: &Joints) -> f64 {
     from.iter()
         .zip(to.iter())

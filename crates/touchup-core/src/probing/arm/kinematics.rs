@@ -1,4 +1,4 @@
-//! Where the flange of a six-axis UR arm is, and which joint angles bring it somewhere.
+//! Kinematics of a six-axis UR arm: pose of the flange, and joint angles of a pose.
 //!
 //! T_B6 = Π A_i, A_i = Rz(θ_i) Tz(d_i) Tx(a_i) Rx(α_i), α = (π/2, 0, 0, π/2, −π/2, 0)      \[Denavit Hartenberg 1955\]
 //!
@@ -10,31 +10,31 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use nalgebra::{Isometry3, Matrix6, Translation3, UnitQuaternion, Vector3};
 
-/// Lengths of a UR; those that the DH parameters of a UR do not name are zero.
+/// Lengths of a UR; those without a DH parameter of a UR are zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UrGeometry {
-    /// m
+    /// DH length d₁, m
     pub d1: f64,
-    /// upper arm, m; negative, as the maker has it
+    /// upper arm, m; negative, as by the maker
     pub a2: f64,
-    /// forearm, m; negative, as the maker has it
+    /// forearm, m; negative, as by the maker
     pub a3: f64,
-    /// m
+    /// DH length d₄, m
     pub d4: f64,
-    /// m
+    /// DH length d₅, m
     pub d5: f64,
-    /// m
+    /// DH length d₆, m
     pub d6: f64,
-    /// how far the upper arm runs beside the shoulder's centre, along the axis of the shoulder, m
+    /// offset of the upper arm beside the shoulder's centre, along the axis of the shoulder, m
     pub upper_arm_beside: f64,
-    /// … and the forearm, m
+    /// offset of the forearm, along the same axis, m
     pub forearm_beside: f64,
-    /// of base, upper arm, forearm and wrist, the thickest place of each, m
+    /// radii of base, upper arm, forearm and wrist, each at its thickest place, m
     pub radii: [f64; 4],
 }
 
 impl UrGeometry {
-    /// Lengths as the maker states them, radii from the maker's drawings, rounded up.
+    /// UR3e: the maker's lengths, and radii from the maker's drawings, rounded up.
     pub const UR3E: Self = Self {
         d1: 0.15185,
         a2: -0.24355,
@@ -46,7 +46,7 @@ impl UrGeometry {
         forearm_beside: 0.027,
         radii: [0.064, 0.050, 0.045, 0.040],
     };
-    /// As there.
+    /// UR5e, from the same sources.
     pub const UR5E: Self = Self {
         d1: 0.1625,
         a2: -0.425,
@@ -58,7 +58,7 @@ impl UrGeometry {
         forearm_beside: 0.007,
         radii: [0.075, 0.062, 0.058, 0.047],
     };
-    /// As there.
+    /// UR10e, from the same sources.
     pub const UR10E: Self = Self {
         d1: 0.1807,
         a2: -0.6127,
@@ -70,7 +70,7 @@ impl UrGeometry {
         forearm_beside: 0.039,
         radii: [0.095, 0.080, 0.070, 0.060],
     };
-    /// As there.
+    /// UR16e, from the same sources.
     pub const UR16E: Self = Self {
         d1: 0.1807,
         a2: -0.4784,
@@ -83,7 +83,7 @@ impl UrGeometry {
         radii: [0.095, 0.080, 0.070, 0.060],
     };
 
-    /// Of a model, by the name that `ur_type` has in ROS.
+    /// Geometry of a model, by its `ur_type` in ROS.
     pub fn of(name: &str) -> Option<Self> {
         let models = [
             ("ur3e", Self::UR3E),
@@ -97,7 +97,7 @@ impl UrGeometry {
             .map(|(_, geometry)| geometry)
     }
 
-    /// d, a and α of each, m and rad.
+    /// DH parameters d, a and α of each link, m and rad.
     fn links(&self) -> [(f64, f64, f64); 6] {
         let Self {
             d1,
@@ -127,7 +127,7 @@ impl UrGeometry {
         })
     }
 
-    /// Velocity of the flange by those of the joints: three rows of m/s, three of rad/s, in B.
+    /// Velocity of the flange by the joint velocities: three rows of m/s, three of rad/s, in B.
     pub fn jacobian(&self, joints: &[f64; 6]) -> Matrix6<f64> {
         let end = self.flange(joints).translation.vector;
         let (mut jacobian, mut pose) = (Matrix6::zeros(), Isometry3::identity());
@@ -143,9 +143,9 @@ impl UrGeometry {
         jacobian
     }
 
-    /// Distance of the arm from a singularity: the smallest singular value of its Jacobian, with
-    /// lengths in units of upper arm and forearm together. Zero where it is stretched, where the
-    /// wrist is above the shoulder, and where axes 4 and 6 are parallel.
+    /// Distance from a singularity: the smallest singular value of the Jacobian, lengths in units
+    /// of upper arm plus forearm. Zero for a stretched arm, for the wrist above the shoulder, and
+    /// for parallel axes 4 and 6.
     pub fn dexterity(&self, joints: &[f64; 6]) -> f64 {
         let mut jacobian = self.jacobian(joints);
         jacobian
@@ -155,10 +155,10 @@ impl UrGeometry {
     }
 
     /// All joint angles in rad, from the base to the wrist, within (−π, π], that bring the flange
-    /// to a pose in B: eight at most, none out of reach.
+    /// to a pose in B: at most eight, none out of reach.
     ///
-    /// Where axes 4 and 6 are parallel only their sum is determined; there the sixth joint stays
-    /// where `near` has it.
+    /// Parallel axes 4 and 6 determine only the sum of their angles; then the sixth joint stays as
+    /// in `near`.
     pub fn inverse(&self, pose_bf: &Isometry3<f64>, near: &[f64; 6]) -> Vec<[f64; 6]> {
         let mut found = Vec::with_capacity(8);
         for q1 in self.shoulders(pose_bf) {
@@ -169,7 +169,7 @@ impl UrGeometry {
         found
     }
 
-    /// The wrist's centre is d₄ beside the plane of the arm.
+    /// First joint: the wrist's centre is d₄ beside the plane of the arm.
     fn shoulders(&self, pose_bf: &Isometry3<f64>) -> Vec<f64> {
         let wrist = pose_bf * nalgebra::Point3::new(0.0, 0.0, -self.d6);
         let distance = wrist.x.hypot(wrist.y);
@@ -197,7 +197,7 @@ impl UrGeometry {
             [Vector3::x(), Vector3::y()].map(|axis| across.dot(&(pose_bf.rotation * axis)));
         let at = |q5: f64| {
             let sign = q5.sin();
-            // axes 4 and 6 are parallel: their sum alone is determined
+            // parallel axes 4 and 6 determine only the sum of their angles
             let q6 = if sign.abs() < PARALLEL {
                 q6_near
             } else {
@@ -217,7 +217,7 @@ impl UrGeometry {
         let links = self.links();
         let first = step(&links[0], q1);
         let last = step(&links[4], q5) * step(&links[5], q6);
-        // of joint 4 as seen from joint 1
+        // pose of joint 4 in the frame of joint 1
         let pose = first.inverse() * pose_bf * last.inverse();
         let target = pose * nalgebra::Point3::new(0.0, -self.d4, 0.0);
         let reach = target.x.hypot(target.y);
@@ -241,12 +241,12 @@ impl UrGeometry {
     }
 }
 
-/// Two axes count as parallel below this angle, rad.
+/// Angle below which two axes are parallel, rad.
 const PARALLEL: f64 = 1e-9;
-/// A cosine may be beyond one by this much rounding: sixteen roundings, and those of lengths.
+/// Maximum rounding of a cosine beyond one: sixteen roundings, and those in the lengths.
 const ROUNDING: f64 = 1e-12;
 
-/// One link: turned by `angle`, d along z, a along x, α about x.
+/// Transform of one link: turn by `angle`, d along z, a along x, α about x.
 fn step(&(d, a, alpha): &(f64, f64, f64), angle: f64) -> Isometry3<f64> {
     let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle);
     let tilt = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), alpha);

@@ -41,7 +41,7 @@ parameters! {
         /// Force at the tip at which everything stops; well below that of the arm's own safety
         /// system.
         ///
-        /// In N: that of a UR may be set to 50 N at the least.
+        /// In N; the limit of a UR's safety system is at least 50 N.
         force: f64 = 15.0, "largest_force_n" [N, 0.1, 100];
         /// No motion of the tip is faster.
         ///
@@ -83,80 +83,80 @@ parameters! {
     check Limits::is_box;
 }
 
-/// Which bound would be left, and by how much.
+/// Exceeded bound, and its excess.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum LimitError {
-    /// Outside the box.
+    /// Outside the workspace.
     #[error("({:.1} {:.1} {:.1}) mm is outside the workspace of the arm", place_mm[0], place_mm[1], place_mm[2])]
     Workspace {
-        /// of the tip in B, mm
+        /// position of the tip in B, mm
         place_mm: [f64; 3],
     },
-    /// No joint angles lead there.
+    /// A pose without joint angles.
     #[error("the arm does not reach ({:.1} {:.1} {:.1}) mm with this orientation", place_mm[0], place_mm[1], place_mm[2])]
     Reach {
-        /// of the tip in B, mm
+        /// position of the tip in B, mm
         place_mm: [f64; 3],
     },
-    /// Only joint angles beyond the range of a joint lead there.
+    /// A pose with joint angles only beyond the range of a joint.
     #[error(
         "the arm reaches ({:.1} {:.1} {:.1}) mm with this orientation only with its joint {joint} outside of {low_deg:.0}° to {high_deg:.0}°: \
          turn the part, or begin with the arm in another configuration",
         place_mm[0], place_mm[1], place_mm[2]
     )]
     JointRange {
-        /// of the tip in B, mm
+        /// position of the tip in B, mm
         place_mm: [f64; 3],
-        /// by name
+        /// name of the joint
         joint: Arc<str>,
-        /// °
+        /// lower end of its range, °
         low_deg: f64,
-        /// °
+        /// upper end of its range, °
         high_deg: f64,
     },
-    /// Another arm than the one that is planned with.
+    /// Another arm than the planned one.
     #[error(
         "the arm has {joints} joints, the one of robot.model has {expected}: name the arm that is there"
     )]
     OtherArm {
-        /// of the arm
+        /// joints of the arm
         joints: usize,
-        /// of its model
+        /// joints of its model
         expected: usize,
     },
-    /// Too near to a singularity.
+    /// Too near a singularity.
     #[error("at ({:.1} {:.1} {:.1}) mm the arm is nearly stuck: dexterity {dexterity:.3}, {least:.3} is the least",
             place_mm[0], place_mm[1], place_mm[2])]
     Singular {
-        /// of the tip in B, mm
+        /// position of the tip in B, mm
         place_mm: [f64; 3],
-        /// there
+        /// dexterity there
         dexterity: f64,
-        /// the limit
+        /// its limit
         least: f64,
     },
-    /// A straight way that its joints cannot follow.
+    /// A straight path that the joints cannot follow.
     #[error(
         "near ({:.1} {:.1} {:.1}) mm a joint would have to turn by {turn_deg:.0}° at once: no straight way leads there with this orientation",
         place_mm[0], place_mm[1], place_mm[2]
     )]
     Jump {
-        /// of the tip in B, mm
+        /// position of the tip in B, mm
         place_mm: [f64; 3],
-        /// °
+        /// turn of the joint, °
         turn_deg: f64,
     },
-    /// The arm would meet itself.
+    /// A collision of the arm with itself.
     #[error("with the tip at ({:.1} {:.1} {:.1}) mm its {link} is {gap_mm:.1} mm from its {other}, {least_mm:.0} mm are the least",
             place_mm[0], place_mm[1], place_mm[2])]
     OwnLinks {
-        /// of the tip in B, mm
+        /// position of the tip in B, mm
         place_mm: [f64; 3],
-        /// one of the two
+        /// one link
         link: Link,
-        /// the other
+        /// the other link
         other: Link,
-        /// between them, mm
+        /// gap between them, mm
         gap_mm: f64,
         /// the limit, mm
         least_mm: f64,
@@ -165,82 +165,82 @@ pub enum LimitError {
     #[error("with the tip at ({:.1} {:.1} {:.1}) mm its {link} leaves robot.arm_low_mm to arm_high_mm by {by_mm:.0} mm",
             place_mm[0], place_mm[1], place_mm[2])]
     ArmBox {
-        /// of the tip in B, mm
+        /// position of the tip in B, mm
         place_mm: [f64; 3],
-        /// which
+        /// the link
         link: Link,
-        /// mm
+        /// distance beyond the box, mm
         by_mm: f64,
     },
     /// A link would be in the part.
     #[error("with the tip at ({:.1} {:.1} {:.1}) mm its {link} is nearer than {least_mm:.0} mm to the part by the mesh",
             place_mm[0], place_mm[1], place_mm[2])]
     Part {
-        /// of the tip in B, mm
+        /// position of the tip in B, mm
         place_mm: [f64; 3],
-        /// which
+        /// the link
         link: Link,
         /// the limit, mm
         least_mm: f64,
     },
-    /// It moves too fast.
+    /// A tip that moves too fast.
     #[error("the tip moves with {mm_per_s:.0} mm/s, over the limit of {limit_mm_per_s:.0} mm/s")]
     Speed {
-        /// mm/s
+        /// speed of the tip, mm/s
         mm_per_s: f64,
-        /// mm/s
+        /// limit, mm/s
         limit_mm_per_s: f64,
     },
-    /// A joint turns too fast.
+    /// A joint that turns too fast.
     #[error(
         "joint {joint} turns with {deg_per_s:.0}°/s, over the limit of {limit_deg_per_s:.0}°/s"
     )]
     JointSpeed {
-        /// from 1 on, at the base
+        /// number of the joint, from 1 at the base
         joint: usize,
-        /// °/s
+        /// turn rate, °/s
         deg_per_s: f64,
-        /// °/s
+        /// limit, °/s
         limit_deg_per_s: f64,
     },
-    /// More than the configuration allows.
+    /// A request beyond the configuration.
     #[error(
         "{what} of {asked} {unit} is beyond the configured {limit} {unit}: a request can only ask for less"
     )]
     Wider {
-        /// which one
+        /// name of the bound
         what: &'static str,
-        /// in the unit
+        /// requested value, in the unit
         asked: f64,
-        /// in the unit
+        /// configured value, in the unit
         limit: f64,
-        /// of both
+        /// unit of both
         unit: &'static str,
     },
-    /// No number, or none that can be.
+    /// A requested bound that is no number above zero.
     #[error("{what} of {asked} {unit} is no limit: give a number above zero")]
     NoLimit {
-        /// which one
+        /// name of the bound
         what: &'static str,
-        /// in the unit
+        /// requested value, in the unit
         asked: f64,
-        /// of it
+        /// unit of the value
         unit: &'static str,
     },
-    /// Too little for a contact.
+    /// Too little force for a contact.
     #[error("a force of {asked_n} N feels no surface: a touch takes more than {least_n} N")]
     TooSoft {
-        /// N
+        /// requested force, N
         asked_n: f64,
-        /// N
+        /// force that it must exceed, N
         least_n: f64,
     },
-    /// Too hard.
+    /// Too much force at the tip.
     #[error("{force_n:.1} N at the tip, over the limit of {limit_n:.1} N")]
     Force {
-        /// N
+        /// force, N
         force_n: f64,
-        /// N
+        /// limit, N
         limit_n: f64,
     },
 }
@@ -248,13 +248,13 @@ pub enum LimitError {
 /// The limits of a request; `None`: as configured.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Narrower {
-    /// N
+    /// largest force, N
     pub force: Option<f64>,
-    /// m/s
+    /// largest speed, m/s
     pub speed: Option<f64>,
-    /// m
+    /// longest search, m
     pub search: Option<f64>,
-    /// s
+    /// longest time, s
     pub time: Option<f64>,
 }
 
@@ -311,10 +311,10 @@ impl Limits {
         })
     }
 
-    /// Whether the tip may be at a place of B.
+    /// Checks a position of the tip in B.
     ///
     /// # Errors
-    /// [`LimitError::Workspace`]; also for a place that is no number.
+    /// [`LimitError::Workspace`]; also for a position that is no number.
     pub(crate) fn check_place(&self, place: &Vector3<f64>) -> Result<(), LimitError> {
         let is_in = (0..3).all(|i| place[i] >= self.lowest[i] && place[i] <= self.highest[i]);
         if is_in {
@@ -326,8 +326,7 @@ impl Limits {
         }
     }
 
-    /// Whether the arm may have its tip at a pose in B; returns joints for it, the nearest to those
-    /// that it has.
+    /// Checks a pose of the tip in B; returns its joints, nearest to `near`.
     ///
     /// - `pose_ft`: the tip in the flange.
     ///
@@ -377,7 +376,7 @@ impl Limits {
         Ok(joints)
     }
 
-    /// Whether its links keep clear of each other, and in the box of the arm.
+    /// Checks that the links keep clear of each other, and in the box of the arm.
     fn check_links(&self, bodies: &ArmBodies<'_>, place_mm: [f64; 3]) -> Result<(), LimitError> {
         let (link, other, gap) = bodies.nearest_pair();
         if gap < LINK_GAP {
@@ -389,7 +388,7 @@ impl Limits {
                 least_mm: LINK_GAP * 1e3,
             });
         }
-        // the base is bolted to what limits the others
+        // the base stands on the table that limits the others
         for (link, capsule) in bodies.links().filter(|(link, _)| **link != Link::Base) {
             let beyond = |end: &Point3<f64>| {
                 let low = self
@@ -418,19 +417,19 @@ impl Limits {
         Ok(())
     }
 
-    /// The deceleration of a stop at a fault, m/s²: no stop is softer than that of any motion.
+    /// Deceleration of a stop at a fault, m/s²: no softer than any motion's.
     pub(crate) fn fault_stop(&self) -> f64 {
         self.braking.max(self.acceleration)
     }
 
-    /// Whether an arm is within them now.
+    /// Checks that an arm is within its limits now.
     ///
     /// # Errors
     /// [`LimitError::Workspace`], [`LimitError::Force`].
     pub(crate) fn check_state(&self, state: &ArmState) -> Result<(), LimitError> {
         self.check_place(&state.pose_bt.translation.vector)?;
         let force_n = state.wrench_b.force.norm();
-        // what is no number is over every limit
+        // NaN is over every limit
         if force_n <= self.force {
             Ok(())
         } else {
@@ -442,7 +441,7 @@ impl Limits {
     }
 }
 
-/// Links keep so far from each other, m: the radius of a probe, and what capsules leave out.
+/// Minimum gap between links, m: the radius of a probe, and the volume beyond the capsules.
 const LINK_GAP: f64 = 10e-3;
 
 pub(crate) fn millimetres(place: &Vector3<f64>) -> [f64; 3] {

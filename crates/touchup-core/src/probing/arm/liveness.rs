@@ -1,31 +1,31 @@
-//! Whether a force sensor senses.
+//! Detection of a stuck force sensor.
 //!
-//! No reading of a real sensor is exactly the one before it for long: noise is in all of them. One
-//! that hangs, is clipped, has lost an axis or reads nothing repeats itself, and the arm would press
-//! on whatever it meets. If it is clipped or dead in one axis that axis alone repeats itself: of
-//! the sensor, of the tip or of the base, whoever turns the force.
+//! No real sensor repeats a reading exactly for long: all have noise. A sensor that hangs, is
+//! clipped, has lost an axis or reads nothing repeats itself, and the arm would press on any
+//! obstacle. A sensor clipped or dead in one axis repeats itself along that axis alone: of the
+//! sensor, the tip or the base, depending on the device that turns the force.
 
 use super::interface::ArmState;
 
-/// Readings that are equal for so long are no readings, s: a sensor that is slower than 17 Hz is
-/// too slow to stop by.
+/// Duration of equal readings that is a fault, s: a sensor slower than 17 Hz is too slow to stop
+/// by.
 const STUCK: f64 = 60e-3;
-/// Rounding of a force that turns there and back, N.
+/// Rounding of a force turned there and back, N.
 const ROUNDING: f64 = 1e-9;
 
-/// The axes that forces are seen in.
+/// Frames in which forces are compared.
 const AXES: [&str; 3] = ["the base", "the tip", "the flange"];
 
-/// A force that repeats itself.
+/// A stuck force reading.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StuckForce {
-    /// along each axis, N
+    /// force along each axis, N
     pub force: [f64; 3],
-    /// the axes along which it repeats itself
+    /// stuck axes
     pub is_stuck: [bool; 3],
-    /// whose axes these are
+    /// frame of these axes
     pub of: &'static str,
-    /// for so long, ms
+    /// duration, ms
     pub ms: f64,
 }
 
@@ -50,15 +50,15 @@ impl std::fmt::Display for StuckForce {
     }
 }
 
-/// How long each component of the force has been what it is.
+/// Duration of the present value of each force component.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Liveness {
-    /// in the axes of base, tip and flange: the value, N, and since when, ns
+    /// in the axes of base, tip and flange: value, N, and stamp of its last change, ns
     seen: Option<[[(f64, i64); 3]; 3]>,
 }
 
 impl Liveness {
-    /// Takes a state; the force that repeats itself.
+    /// Takes a state; returns the stuck force, if any.
     pub fn take(&mut self, state: &ArmState) -> Option<StuckForce> {
         let (force_b, now) = (state.wrench_b.force, state.stamp_ns);
         let force_t = state.pose_bt.rotation.inverse() * force_b;
@@ -78,13 +78,13 @@ impl Liveness {
             let Some(since) = since.map(|((_, since), _)| *since).max() else {
                 continue;
             };
-            // whether the whole force hangs the one that the arm stops by says: not all arms tell a raw one
+            // a raw force stuck in all axes is no fault here: not all arms report one
             if of == AXES[2] && is_stuck == [true; 3] {
                 continue;
             }
             let ms = (now - since) as f64 * 1e-6;
             let force = force.into();
-            // the axes that most of them are in are its own
+            // the frame with most stuck axes is the sensor's own
             let count = |is_stuck: [bool; 3]| is_stuck.iter().filter(|is_stuck| **is_stuck).count();
             if stuck.is_some_and(|before| count(before.is_stuck) >= count(is_stuck)) {
                 continue;

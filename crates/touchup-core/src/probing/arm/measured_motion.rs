@@ -1,4 +1,4 @@
-//! The speed of an arm as its states show it: of its tip and of each of its joints.
+//! Measured speeds of an arm: of its tip and of each of its joints.
 
 use std::collections::VecDeque;
 
@@ -8,24 +8,24 @@ use super::interface::ArmState;
 use super::joints::Joints;
 use super::limits::{LimitError, Limits};
 
-/// Speeds are means over this many periods: the noise of a place is 1 mm/s then.
+/// Periods in a mean speed: the noise of a position is then 1 mm/s.
 const WINDOW: usize = 10;
-/// The tip may be faster than its limit by this factor, and by this, m/s: an arm that overshoots,
-/// and noise.
+/// Allowed tip speed over its limit, as a factor and an addition, m/s: overshoot of the arm, and
+/// noise.
 const OVER: (f64, f64) = (1.2, 5e-3);
 
-/// The latest states of an arm.
+/// Latest states of an arm.
 #[derive(Clone, Debug, Default)]
 pub(super) struct MeasuredMotion {
-    /// stamp in ns, place of the tip in B in m, joints in rad
+    /// stamp in ns, position of the tip in B in m, joints in rad
     recent: VecDeque<(i64, Vector3<f64>, Joints)>,
 }
 
 impl MeasuredMotion {
-    /// Takes a state; whether the arm is slower than its limits.
+    /// Takes a state, and checks its speeds.
     ///
     /// # Errors
-    /// [`LimitError::Speed`], [`LimitError::JointSpeed`]; also for what is no number.
+    /// [`LimitError::Speed`], [`LimitError::JointSpeed`]; also for NaN.
     pub fn take(&mut self, state: &ArmState, limits: &Limits) -> Result<(), LimitError> {
         let place = state.pose_bt.translation.vector;
         self.recent.push_back((state.stamp_ns, place, state.joints));
@@ -37,7 +37,7 @@ impl MeasuredMotion {
         };
         let seconds = (state.stamp_ns - begun_ns) as f64 * 1e-9;
         let speed = (place - from).norm() / seconds;
-        // what is no number is over every limit
+        // NaN is over every limit
         if speed.is_nan() || speed > limits.speed * OVER.0 + OVER.1 {
             return Err(LimitError::Speed {
                 mm_per_s: speed * 1e3,
@@ -59,7 +59,7 @@ impl MeasuredMotion {
         Ok(())
     }
 
-    /// Forgets what was seen: what comes next need not follow it.
+    /// Forgets past states: the next ones need not follow them.
     pub fn forget(&mut self) {
         self.recent.clear();
     }
@@ -72,8 +72,8 @@ mod tests {
     use crate::stylus::Wrench;
     use nalgebra::Isometry3;
 
-    /// The first verdict on states 2 ms apart of a tip and a third joint with these speeds, m/s and
-    /// rad/s, and how many came.
+    /// First verdict on states 2 ms apart, of a tip and a third joint with these speeds, m/s and
+    /// rad/s, and the number of states.
     fn moving(speed: f64, turning: f64) -> (usize, Option<LimitError>) {
         let (mut motion, limits) = (
             MeasuredMotion::default(),

@@ -1,9 +1,8 @@
-//! An arm that holds a probe, and how it touches.
+//! An arm that holds a probe, and its touches.
 //!
-//! [`Arm`] is what is needed of one, [`Limits`] what it must never leave. [`Watched::touch`] makes
-//! one touch and says where the part was touched: where the curve of force over travel bends
-//! ([`find_onset`]), not where the arm came to rest. [`Watched::slide`] presses with a constant
-//! force and follows a path.
+//! [`Arm`] is the interface of an arm, [`Limits`] its bounds. [`Watched::touch`] makes one touch
+//! and returns the contact: the corner of force over travel ([`find_onset`]), not the position of
+//! rest. [`Watched::slide`] presses with a constant force and follows a path.
 
 mod bodies;
 mod capsule;

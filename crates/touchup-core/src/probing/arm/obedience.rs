@@ -1,17 +1,17 @@
-//! Compares the velocity of the arm with what was ordered.
+//! Comparison of the arm's velocity with its orders.
 //!
-//! A program that hangs while the thread of its motion lives takes orders that nobody reads: every
-//! call returns, the watchdog is fed, and the arm goes on. Only its velocity tells.
+//! A program that hangs while its motion thread lives does not read its orders: every call returns,
+//! the watchdog is fed, and the arm goes on. Only its velocity tells.
 //!
-//! The ordered velocity is followed by one without mass or delay: towards the target of the newest
-//! order with the acceleration that the order allows. An arm is late, by a time that no two arms
-//! share, but goes through the same velocities; so what it does now was ordered within the last
-//! [`WINDOW`], or is slower than that. While it presses, the velocity along the axis is its own, up
-//! to the speed that force mode has.
+//! A model without mass or delay follows the orders: towards the target of the newest order with
+//! the acceleration that the order allows. An arm is late, by a time of its own, but passes through
+//! the same velocities; so its present velocity was ordered within the last [`WINDOW`], or is
+//! slower than that. While it presses, the velocity along the axis is free, up to the speed of
+//! force mode.
 //!
-//! A creep is slower than the noise of a velocity, so at rest the place counts: it may not leave
-//! where it was when rest had been ordered for [`WINDOW`]. Orders that stay away order rest, for
-//! the client brakes then.
+//! A creep is slower than the noise of a velocity, so at rest the position counts: it may not leave
+//! its value after [`WINDOW`] of ordered rest. Missing orders mean rest, for the client then
+//! brakes.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -20,91 +20,91 @@ use nalgebra::{Isometry3, Vector3};
 
 use super::interface::ArmError;
 
-/// An arm is at most this late.
+/// Maximum delay of an arm.
 const WINDOW: Duration = Duration::from_millis(80);
-/// It disobeys when it does so for longer than this: a contact that springs back is over sooner.
+/// Duration of disobedience that is a fault: a contact that springs back is over sooner.
 const LASTING: Duration = Duration::from_millis(20);
-/// It may be faster than ordered by this share …
+/// Allowed excess of the speed, as a share of the ordered one.
 const SHARE: f64 = 0.2;
-/// … and by this, m/s: what its velocity is measured with, and a tip that springs.
+/// Additional allowed excess of the speed, m/s: its noise, and a tip that springs.
 const NOISE: f64 = 5e-3;
-/// It may turn faster than ordered by this, rad/s.
+/// Allowed excess of the turn rate, rad/s.
 const TURN_NOISE: f64 = 50e-3;
-/// Turning is braked by whatever the controller has: what was ordered within this time is no
-/// disobedience.
+/// Time within which an ordered turn still counts: the controller brakes turns with its own
+/// deceleration.
 const TURN_WINDOW: Duration = Duration::from_millis(300);
-/// Force mode may be faster than it is set by this factor.
+/// Allowed speed of force mode, over the set one.
 const PRESS: f64 = 1.5;
-/// Deceleration of an arm that has no order, or hears nothing, m/s²: its driver brakes so.
+/// Deceleration of an arm without orders or contact to its client, m/s²: its driver brakes so.
 const REST: f64 = 2.0;
-/// An order that no other follows is in force for this long: then the client brakes.
+/// Validity of an order without a successor: then the client brakes.
 const FRESH: Duration = Duration::from_millis(25);
-/// At rest the tip stays where it is within this, m: ten times what a place is measured with.
+/// Maximum distance of a resting tip from its position, m: ten times the noise of a position.
 const CREEP: f64 = 0.1e-3;
-/// … and does not turn by more than this, rad.
+/// Maximum turn of a resting tip, rad.
 const CREEP_TURN: f64 = 2e-3;
 
-/// What an arm is ordered to do, as far as it shows in its velocity.
+/// Order to an arm, as it shows in the velocity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum OrderedMotion {
-    /// Goes with a velocity.
+    /// Moves with a velocity.
     Move {
-        /// m/s and rad/s in B
+        /// velocity, m/s and rad/s in B
         twist: [f64; 6],
-        /// m/s²
+        /// acceleration, m/s²
         acceleration: f64,
     },
-    /// Presses along an axis and goes across it with a velocity.
+    /// Presses along an axis and moves across it with a velocity.
     Press {
         /// unit vector in B
         axis: Vector3<f64>,
-        /// largest along the axis, m/s
+        /// largest speed along the axis, m/s
         speed: f64,
-        /// m/s in B
+        /// velocity across the axis, m/s in B
         feed: Vector3<f64>,
-        /// m/s²
+        /// acceleration, m/s²
         acceleration: f64,
     },
-    /// To rest.
+    /// Brakes to rest.
     Stop {
-        /// m/s²
+        /// deceleration, m/s²
         deceleration: f64,
     },
 }
 
-/// A velocity that was ordered once.
+/// An ordered velocity.
 #[derive(Clone, Copy, Debug)]
 struct Ordered {
     at: Duration,
-    /// m/s in B
+    /// velocity, m/s in B
     linear: Vector3<f64>,
-    /// rad/s
+    /// turn rate, rad/s
     turn: f64,
     /// axis in B, and the speed of force mode along it, m/s
     press: Option<(Vector3<f64>, f64)>,
-    /// whether the order is to rest, also where the velocity is not zero yet
+    /// whether the order is rest, even at a velocity above zero
     rests: bool,
 }
 
-/// What was ordered lately.
+/// Recent orders to an arm, and its disobedience.
 #[derive(Debug)]
 pub struct Obedience {
-    /// the newest last; what it would do by now without mass and delay
+    /// velocities without mass and delay, the newest last
     ordered: VecDeque<Ordered>,
     target: Vector3<f64>,
-    /// m/s²
+    /// acceleration of the newest order, m/s²
     acceleration: f64,
-    /// when the newest order went out
+    /// time of the newest order
     ordered_at: Duration,
     since: Option<Duration>,
-    /// where it has to stay, in B
+    /// pose of ordered rest, in B
     rests_at: Option<Isometry3<f64>>,
 }
 
 impl Obedience {
-    /// Of an arm at rest.
+    /// For an arm at rest.
     ///
-    /// - `now`: since some moment, as all times here.
+    /// - `now`: time since some moment, as all times here.
     pub fn new(now: Duration) -> Self {
         let rest = Ordered {
             at: now,
@@ -123,7 +123,7 @@ impl Obedience {
         }
     }
 
-    /// An order goes out.
+    /// Records an order.
     pub fn order(&mut self, what: &OrderedMotion, now: Duration) {
         self.follow(now);
         let (target, turn, acceleration, press) = match *what {
@@ -157,11 +157,11 @@ impl Obedience {
     }
 
     fn newest(&self) -> Ordered {
-        // there is always one
+        // never empty
         self.ordered[self.ordered.len() - 1]
     }
 
-    /// The ordered velocity goes on until now, or until its order is too old.
+    /// Continues the ordered velocity until now, or until its order is stale.
     fn follow(&mut self, now: Duration) {
         let stale = self.ordered_at + FRESH;
         let goes = self.target != Vector3::zeros()
@@ -195,7 +195,7 @@ impl Obedience {
 
     fn push(&mut self, ordered: Ordered) {
         self.ordered.push_back(ordered);
-        // one that is older is kept: it was in force when the time began
+        // one older entry stays: it was in force when the window began
         while self
             .ordered
             .get(1)
@@ -205,7 +205,7 @@ impl Obedience {
         }
     }
 
-    /// A state of the arm; returns the fault of one that does not do what it is ordered to.
+    /// Takes a state of the arm; returns the fault of a disobedient one.
     ///
     /// - `pose`: of the tip in B; `velocity`: m/s and rad/s in B.
     pub fn see(
@@ -246,7 +246,7 @@ impl Obedience {
         (now.saturating_sub(since) > LASTING).then(fault)
     }
 
-    /// Whether an arm that is to rest has left its place.
+    /// Whether an arm has left its place against an order to rest.
     fn creeps(&mut self, rests: bool, pose: &Isometry3<f64>) -> bool {
         if !rests {
             self.rests_at = None;
@@ -259,7 +259,7 @@ impl Obedience {
 }
 
 impl Ordered {
-    /// How far a velocity is from one between rest and this, m/s.
+    /// Distance of a velocity from the range between rest and the ordered velocity, m/s.
     fn beyond(&self, velocity: &Vector3<f64>) -> f64 {
         let mut off = velocity - self.linear;
         let mut own = *velocity;
@@ -296,8 +296,8 @@ mod tests {
 
     const STOP: OrderedMotion = OrderedMotion::Stop { deceleration: 0.5 };
 
-    /// An order and a state each 2 ms; when the first fault is seen, ms. The place does not follow
-    /// the velocity.
+    /// One order and one state per 2 ms; returns the time of the first fault, ms. The position does
+    /// not follow the velocity.
     fn first_fault(
         ms: u32,
         order: impl Fn(u32) -> OrderedMotion,
@@ -306,7 +306,7 @@ mod tests {
         first_fault_of(ms, |at| Some(order(at)), |at| ([0.0; 6], velocity(at)))
     }
 
-    /// The same with the place, and orders that may stay away.
+    /// As `first_fault`, with positions, and orders that may be missing.
     fn first_fault_of(
         ms: u32,
         order: impl Fn(u32) -> Option<OrderedMotion>,
@@ -327,8 +327,8 @@ mod tests {
         })
     }
 
-    /// Speed of an arm that reaches 50 mm/s with 0.5 m/s² from 0 ms on and brakes from 200 ms on,
-    /// late by some time, m/s.
+    /// Speed, m/s, of an arm that reaches 50 mm/s with 0.5 m/s² from 0 ms on and brakes from 200 ms
+    /// on, late by some time.
     fn late(at: u32, by: u32) -> f64 {
         let at = f64::from(at.saturating_sub(by)) * 1e-3;
         (0.5 * at).min(0.05).min((0.05 - 0.5 * (at - 0.2)).max(0.0))
@@ -344,7 +344,7 @@ mod tests {
                 "late by {by} ms"
             );
         }
-        // braked sooner and harder than ordered, as when the client brakes by itself
+        // braking sooner and harder than ordered, as when the client brakes by itself
         assert_eq!(
             first_fault(800, order, |at| along(if at < 150 {
                 late(at, 10)
@@ -355,8 +355,8 @@ mod tests {
         );
     }
 
-    /// From 50 to 35 mm/s, which is as much as it may be off, are 30 ms; then the 80 ms that it may
-    /// be late, and the 20 ms.
+    /// From 50 to 35 mm/s, the allowed deviation, takes 30 ms; then come the 80 ms of delay, and
+    /// the 20 ms.
     #[test]
     fn an_arm_that_goes_on_after_a_stop_is_seen_within_140_ms() {
         let order = |at| if at < 200 { go(0.05) } else { STOP };
@@ -377,8 +377,8 @@ mod tests {
         );
     }
 
-    /// 2 mm/s from the beginning, which is within the noise of the velocity; the place of the first
-    /// state counts, and more than 0.1 mm off it is the 26th after that.
+    /// 2 mm/s from the beginning, within the noise of the velocity; the position of the first state
+    /// counts, and the 26th state after it is more than 0.1 mm off.
     #[test]
     fn an_arm_that_creeps_where_rest_is_ordered_is_seen_after_a_tenth_of_a_millimetre() {
         let creeping =
@@ -392,11 +392,11 @@ mod tests {
             first_fault_of(2000, |_| Some(STOP), creeping(0.1e-3)),
             Some(1002)
         );
-        // rest is ordered from 0 ms on, counts 80 ms later, and 0.1 mm take 50 ms
+        // the order to rest comes at 200 ms, counts 80 ms later, and 0.1 mm takes 50 ms
         let order = |at| Some(if at < 200 { go(2e-3) } else { STOP });
         let seen = first_fault_of(600, order, creeping(2e-3)).unwrap();
         assert!((320..=345).contains(&seen), "{seen} ms");
-        // the noise of a place, 10 um, and one that follows its order
+        // the noise of a position, 30 um, and an arm that follows its order
         let noisy = |at: u32| {
             (
                 along(if at.is_multiple_of(4) { 30e-6 } else { -30e-6 }),
@@ -421,15 +421,15 @@ mod tests {
         );
     }
 
-    /// 25 ms after the last order its client brakes with 2 m/s², so 15 mm/s off is 7 ms later; then
-    /// the 80 ms and the 20 ms.
+    /// 25 ms after the last order the client brakes with 2 m/s², so 15 mm/s off is 7 ms later; then
+    /// come the 80 ms and the 20 ms.
     #[test]
     fn an_arm_that_goes_on_where_orders_stay_away_is_seen_within_140_ms() {
         let order = |at| (at < 200).then(|| go(0.05));
         let goes_on = |at: u32| ([0.0; 6], along(late(at.min(200), 0)));
         let seen = first_fault_of(800, order, goes_on).unwrap();
         assert!((300..=340).contains(&seen), "{seen} ms");
-        // one whose client brakes 6 ms late
+        // a client that brakes 6 ms late
         let speed =
             |at: u32| (0.05_f64).min((0.05 - 2.0 * (f64::from(at) * 1e-3 - 0.231)).max(0.0));
         let braked = |at: u32| ([0.0; 6], along(speed(at).min(late(at.min(200), 0))));
@@ -441,7 +441,7 @@ mod tests {
         let aside = |at: u32| [0.0, late(at.min(200), 0), 0.0, 0.0, 0.0, 0.0];
         assert!(first_fault(400, |_| go(0.05), aside).is_some());
         assert!(first_fault(400, |_| go(0.05), |at| along(-late(at.min(200), 0))).is_some());
-        // a bend of the way by a right angle is none: it goes through what was ordered
+        // a bend of the path by a right angle is obedient: it goes through ordered velocities
         let bend = |at| {
             if at < 200 {
                 go(0.05)

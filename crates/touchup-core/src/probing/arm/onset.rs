@@ -1,13 +1,13 @@
-//! Where a touch began: the corner of force over travel, going in and coming out.
+//! Onset of a touch: the corner of force over travel, going in and coming out.
 //!
 //! f(t) = b + k max(0, s(t − τ) − s₀)
 //!
-//! s is the travel of the arm along its approach as it is reported, f the force against it, b what
-//! the sensor reads in free air, k the stiffness of arm, probe and part in series, τ how much later
-//! the force is stamped than the travel. While the arm presses, it is reported deeper than the tip
-//! is, by f/k; at the corner s₀ it is not. The fit takes the whole curve, so that neither the
-//! threshold at which the arm was commanded to stop nor its braking travel is in s₀. τ moves the
-//! corner forward going in and backward coming out: a touch that does both determines it.
+//! s is the reported travel of the arm along its approach, f the force against it, b the sensor
+//! reading in free air, k the stiffness of arm, probe and part in series, τ the delay of the
+//! force's stamps against the travel's. While the arm presses, its reported depth exceeds the tip's
+//! by f/k; at the corner s₀ it does not. The fit uses the whole curve, so s₀ contains neither the
+//! threshold of the stop command nor the braking travel. τ moves the corner forward going in and
+//! backward coming out: a touch with both determines it.
 
 use nalgebra::{Cholesky, Matrix4, Vector3, Vector4};
 
@@ -17,13 +17,13 @@ use crate::{names, parameters};
 /// One moment of a touch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TouchMoment {
-    /// s, growing
+    /// time, s, increasing
     pub t: f64,
-    /// of the arm along its approach, m; into the part is positive
+    /// travel of the arm along its approach, m; positive into the part
     pub travel: f64,
-    /// on the tip against the approach, N; what presses is positive
+    /// force on the tip against the approach, N; positive for a push
     pub force: f64,
-    /// on the tip across the approach, N
+    /// force on the tip across the approach, N
     pub lateral: f64,
 }
 
@@ -31,60 +31,60 @@ parameters! {
     /// Settings of [`find_onset`].
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct OnsetParams in "robot" {
-        /// What is believed of τ before the touch, s …
+        /// Prior of τ, s.
         delay: f64 = 0.0;
-        /// … and its standard deviation, s: a cycle or two of a controller at 500 Hz, and its
+        /// Standard deviation of this prior, s: a cycle or two of a controller at 500 Hz, and its
         /// filter.
         delay_sigma: f64 = 4e-3;
         /// Standard deviation of the measured force.
         ///
-        /// In N, in free air; noise that is smaller is not believed. That of a wrist.
+        /// In N, in free air, for a wrist; also the least that the fit believes.
         force_noise: f64 = 0.15, "force_noise_n" [N, 0.0001, 10];
-        /// The force that counts as contact for verdicts, N.
+        /// Force of a contact for verdicts, N.
         contact_force: f64 = 0.5;
-        /// Shorter contacts are impacts, s.
+        /// Duration below which a contact is an impact, s.
         shortest_contact: f64 = 10e-3;
-        /// Largest share of the force across the approach; more is an edge or a slope. Friction of
-        /// a steel ball on metal is below 0.3; a slope of 20 degrees adds as much.
+        /// Largest share of the force across the approach; more means an edge or a slope. Friction
+        /// of a steel ball on metal is below 0.3; a slope of 20 degrees adds as much.
         lateral_share: f64 = 0.65;
     }
 }
 
 names! {
-    /// The class of the curve of a touch.
+    /// Class of the curve of a touch.
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
     pub enum OnsetVerdict {
-        /// One line in free air, one in contact, the same in and out.
+        /// One line in free air, one in contact, equal in and out.
         Clean = "clean",
         /// Going in and coming out differ: the tip slipped sideways or the part yielded.
         Slip = "slip",
-        /// Much of the force was across the approach: an edge, or a slope.
+        /// Much of the force is across the approach: an edge, or a slope.
         Edge = "edge",
-        /// Contact was lost and found again going in.
+        /// Contact lost and found again going in.
         Bounce = "bounce",
-        /// A short push that was no contact: something hit the arm or the table.
+        /// A short push without contact: something hit the arm or the table.
         Impact = "impact",
     }
 }
 
-/// Where a touch began.
+/// Onset of a touch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Onset {
-    /// s₀, m
+    /// travel s₀, m
     pub travel: f64,
-    /// its standard uncertainty, m
+    /// standard uncertainty of s₀, m
     pub sigma: f64,
-    /// k, N/m
+    /// stiffness k, N/m
     pub stiffness: f64,
-    /// standard uncertainty of it, N/m
+    /// standard uncertainty of k, N/m
     pub stiffness_sigma: f64,
-    /// τ, s
+    /// delay τ, s
     pub delay: f64,
-    /// b, N
+    /// bias b, N
     pub bias: f64,
-    /// largest force above it, N
+    /// largest force above b, N
     pub peak: f64,
-    /// the class of the curve
+    /// class of the curve
     pub verdict: OnsetVerdict,
 }
 
@@ -94,9 +94,9 @@ pub enum OnsetError {
     /// The force never rose.
     #[error("no contact: the largest force was {peak_n:.2} N, contact begins at {contact_n:.2} N")]
     NoContact {
-        /// N
+        /// largest force, N
         peak_n: f64,
-        /// N
+        /// force of a contact, N
         contact_n: f64,
     },
     /// Contact from the first moment on.
@@ -104,13 +104,13 @@ pub enum OnsetError {
         "in contact before the search began: {count} moments in free air, {LEAST} are needed; search from farther away"
     )]
     NoFreeAir {
-        /// moments
+        /// moments in free air
         count: usize,
     },
-    /// Something is no number, or goes back in time.
+    /// A value that is no number, or a stamp that goes back.
     #[error("moment {index} of the touch is no number, or not later than the one before")]
     BadMoment {
-        /// which one
+        /// index of the moment
         index: usize,
     },
     /// The fit does not converge.
@@ -118,9 +118,9 @@ pub enum OnsetError {
     NoFit,
 }
 
-/// Moments on each side of the corner at the least.
+/// Minimum number of moments on each side of the corner.
 const LEAST: usize = 5;
-/// Steps of a fit; five are usual.
+/// Damping of the fit; five steps are usual.
 const SEARCH: DampedSearch = DampedSearch {
     first: 1e-6,
     factors: [0.1, 10.0],
@@ -128,32 +128,31 @@ const SEARCH: DampedSearch = DampedSearch {
     most: 1e9,
     tries: 60,
 };
-/// The corner has converged when a step moves it by less than this, m.
+/// Step of the corner at which the fit has converged, m.
 const REST: f64 = 1e-9;
-/// Times that the noise is taken from the residuals.
+/// Estimates of the noise from the residuals.
 const WEIGHINGS: usize = 3;
-/// Moments that share one error of the travel after smoothing: one over the middle weight of the
-/// parabola, 89/429 for eleven.
+/// Moments that share one error of the travel after smoothing: the inverse of the middle weight of
+/// the parabola, 89/429 for eleven.
 const SMOOTHED: f64 = 429.0 / 89.0;
-/// Neighbours farther away than this share nothing: twice the smoothing.
+/// Largest distance of neighbours with shared errors: twice the smoothing.
 const FARTHEST: usize = 2 * BESIDE;
 /// Deviations of the force that noise alone does not reach.
 const NOISE: f64 = 6.0;
-/// Moments on each side that the travel is smoothed over: 20 ms at 500 Hz.
+/// Moments on each side in the smoothed travel: 20 ms at 500 Hz.
 const BESIDE: usize = 5;
-/// Moments on each side that the speed is taken from.
+/// Moments on each side in the speed.
 const BESIDE_SPEED: usize = 15;
-/// Delays that are tried first, in standard deviations of what is believed.
+/// Initial delays of the fit, in standard deviations of the prior.
 const STARTS: [f64; 5] = [0.0, -1.0, 1.0, -2.0, 2.0];
-/// In and out differ when their residuals do by this share of the largest force …
+/// Difference of the residuals in and out that is hysteresis, over the largest force.
 const HYSTERESIS: f64 = 0.05;
-/// … and by this many standard deviations of the force.
+/// Smallest such difference, in standard deviations of the force.
 const CLEARLY: f64 = 4.0;
 
 /// Fits the bent line to a touch.
 ///
-/// - `moments`: the approach through free air, the contact, and, as far as there is one, the
-///   retraction.
+/// - `moments`: the approach through free air, the contact, and the retraction, if there is one.
 ///
 /// # Errors
 /// [`OnsetError`].
@@ -194,7 +193,7 @@ pub fn find_onset(moments: &[TouchMoment], params: &OnsetParams) -> Result<Onset
     let (mut line, _) = fits
         .min_by(|a, b| a.1.total_cmp(&b.1))
         .ok_or(OnsetError::NoFit)?;
-    // noise of the travel is in the force while the arm presses, and nowhere else
+    // noise of the travel enters the force only while the arm presses
     for _ in 0..WEIGHINGS {
         curve.noise = curve.seen_noise(&line);
         line = curve.fit(line).ok_or(OnsetError::NoFit)?.0;
@@ -214,7 +213,7 @@ pub fn find_onset(moments: &[TouchMoment], params: &OnsetParams) -> Result<Onset
     })
 }
 
-/// Places of the unknowns.
+/// Indices of the unknowns.
 const S0: usize = 0;
 const TAU: usize = 1;
 const B: usize = 2;
@@ -222,9 +221,9 @@ const K: usize = 3;
 
 type LineFit = Vector4<f64>;
 
-/// Travel at each moment by a parabola through those around it \[Savitzky Golay 1964\], speed by a
-/// line through more of them. A speed that is noisy would look like one that changes, and so
-/// simulate a delay.
+/// Travel at each moment by a parabola through its neighbours \[Savitzky Golay 1964\], speed by a
+/// line through more of them. A noisy speed would look like a changing one, and so simulate a
+/// delay.
 fn smoothed(moments: &[TouchMoment]) -> Vec<Smooth> {
     let around = |index: usize, beside: usize| {
         &moments[index.saturating_sub(beside)..(index + beside + 1).min(moments.len())]
@@ -271,11 +270,11 @@ fn smoothed(moments: &[TouchMoment]) -> Vec<Smooth> {
 struct Smooth {
     travel: f64,
     speed: f64,
-    /// of the speed, for travel with a variance of 1 m²; 1/s²
+    /// variance of the speed for a travel with a variance of 1 m²; 1/s²
     speed_variance: f64,
 }
 
-/// How many neighbours on average share one error: 1 + 2 Σ ρ, as long as ρ is above zero \[Geyer
+/// Average number of neighbours with one shared error: 1 + 2 Σ ρ, while ρ is above zero \[Geyer
 /// 1992\].
 fn shared(residuals: &[f64]) -> f64 {
     let square: f64 = residuals.iter().map(|r| r * r).sum();
@@ -296,7 +295,7 @@ fn shared(residuals: &[f64]) -> f64 {
 
 struct ForceCurve<'a> {
     moments: &'a [TouchMoment],
-    /// of each moment travel and speed without noise
+    /// travel and speed of each moment without noise
     path: Vec<Smooth>,
     params: &'a OnsetParams,
     /// standard deviations of the force in free air and while pressing, N
@@ -304,14 +303,14 @@ struct ForceCurve<'a> {
 }
 
 impl ForceCurve<'_> {
-    /// Force in free air and the largest, N.
+    /// Force in free air, and the largest force, N.
     fn free_air(&self) -> Result<(f64, f64), OnsetError> {
         let peak = self
             .moments
             .iter()
             .map(|m| m.force)
             .fold(f64::NEG_INFINITY, f64::max);
-        // the lower quarter of all forces before the peak is free air, or there is none
+        // the first quarter of the forces before the peak is free air, or there is none
         let before: Vec<_> = self
             .moments
             .iter()
@@ -356,8 +355,7 @@ impl ForceCurve<'_> {
         self.moments[last].travel
     }
 
-    /// Travel at a time and how fast it grows, between the moments; beyond them it goes on as at
-    /// the end.
+    /// Travel and speed at a time, between the moments; beyond them as at the end.
     fn travel(&self, t: f64) -> (f64, f64) {
         let after = self.moments.partition_point(|m| m.t <= t);
         let before = after.saturating_sub(1);
@@ -374,7 +372,7 @@ impl ForceCurve<'_> {
         }
     }
 
-    /// Residual, its derivatives by the unknowns, and whether it is in free air, 0, or pressing, 1.
+    /// Residual, its derivatives by the unknowns, and its side: 0 in free air, 1 while pressing.
     fn residual(&self, m: &TouchMoment, line: &LineFit) -> (f64, LineFit, usize) {
         let (travel, speed) = self.travel(m.t - line[TAU]);
         let depth = (travel - line[S0]).max(0.0);
@@ -387,7 +385,7 @@ impl ForceCurve<'_> {
         )
     }
 
-    /// Sum of squared residuals over their variances, with what is believed of τ.
+    /// Sum of squared residuals over their variances, with the prior of τ.
     fn cost(&self, line: &LineFit) -> f64 {
         let of = |m: &TouchMoment| {
             let (residual, _, is_in) = self.residual(m, line);
@@ -397,9 +395,9 @@ impl ForceCurve<'_> {
         self.moments.iter().map(of).sum::<f64>() + believed * believed
     }
 
-    /// Of a small change of the line.
+    /// Normal equations of a small change of the line.
     ///
-    /// - `noise`: that weights the moments, N in free air and while pressing.
+    /// - `noise`: weights of the moments, N in free air and while pressing.
     fn normal_equations(&self, line: &LineFit, noise: [f64; 2]) -> NormalEquations<4> {
         let mut equations = NormalEquations::default();
         for m in self.moments {
@@ -409,7 +407,7 @@ impl ForceCurve<'_> {
         equations
     }
 
-    /// The line of least cost near another, and its cost.
+    /// Line of least cost near another, and its cost.
     fn fit(&self, line: LineFit) -> Option<(LineFit, f64)> {
         let believed = self.params.delay_sigma.powi(-2);
         let equations = |line: &LineFit| {
@@ -448,7 +446,7 @@ impl ForceCurve<'_> {
         found
     }
 
-    /// What the residuals show, N; never less than the noise of the force.
+    /// Noise by the residuals, N; never less than the noise of the force.
     fn seen_noise(&self, line: &LineFit) -> [f64; 2] {
         // two unknowns each
         let rms = |of: &Vec<f64>| {
@@ -460,11 +458,11 @@ impl ForceCurve<'_> {
             .map(|of| rms(of).max(self.params.force_noise))
     }
 
-    /// Of the unknowns. Neighbours that share their noise count as fewer.
+    /// Covariance of the unknowns. Neighbours with shared noise count as fewer.
     fn covariance(&self, line: &LineFit) -> Option<Matrix4<f64>> {
         let [free, pressing] = self.residuals(line);
         let [alone, all] = self.noise.map(|noise| noise * noise);
-        // what the noise of the travel adds while it presses is shared over the smoothing
+        // smoothing correlates the noise that the travel adds while the arm presses
         let by_travel = ((all - alone) / all).max(0.0);
         let shared = [
             shared(&free),
@@ -472,7 +470,7 @@ impl ForceCurve<'_> {
         ];
         let noise = [0, 1].map(|at| self.noise[at] * f64::sqrt(shared[at]));
         let mut square = self.normal_equations(line, noise).information;
-        // of the information on τ, some is noise of the speed
+        // part of the information on τ is noise of the speed
         let travel_variance = self.travel_variance();
         let pressing = self
             .moments
@@ -492,7 +490,7 @@ impl ForceCurve<'_> {
         })
     }
 
-    /// Of the reported travel about its smoothed one, m².
+    /// Variance of the reported travel about its smoothed value, m².
     fn travel_variance(&self) -> f64 {
         let squares = self
             .moments
@@ -517,14 +515,14 @@ impl ForceCurve<'_> {
         }
     }
 
-    /// The moment from which on it goes back.
+    /// Moment at which the tip begins to go back.
     fn deepest(&self) -> usize {
         (0..self.path.len())
             .max_by(|&a, &b| self.path[a].travel.total_cmp(&self.path[b].travel))
             .unwrap_or(0)
     }
 
-    /// The force that counts as contact, N: noise alone does not reach it.
+    /// Force of a contact, N: noise alone does not reach it.
     fn contact_force(&self) -> f64 {
         self.params
             .contact_force
@@ -536,7 +534,7 @@ impl ForceCurve<'_> {
         let is_short = |&(first, last): &(usize, usize)| {
             self.moments[last].t - self.moments[first].t < self.params.shortest_contact
         };
-        // the tip was clearly above the surface: what pushed it was something else
+        // the tip was clearly above the surface: something else pushed it
         let is_above = |&(first, _): &(usize, usize)| {
             let Smooth { travel, speed, .. } = self.path[first];
             let later =
@@ -559,9 +557,9 @@ impl ForceCurve<'_> {
         }
     }
 
-    /// First and last moments of each contact that began going in; between two the force is less
-    /// than half of what counts as one. The mean of five forces is looked at: noise makes no
-    /// contact out of one that comes slowly.
+    /// First and last moments of each contact that began going in; between two contacts the force
+    /// falls below half of a contact's. The mean of five forces decides: noise splits no slow
+    /// contact.
     fn contacts(&self, bias: f64) -> Vec<(usize, usize)> {
         let mut contacts: Vec<(usize, usize)> = Vec::new();
         let (mut is_in, deepest) = (false, self.deepest());
@@ -594,8 +592,8 @@ impl ForceCurve<'_> {
         median(&mut shares).unwrap_or(0.0)
     }
 
-    /// Whether the force differs between going in and coming out at the same depth, by itself or as
-    /// a delay that cannot be.
+    /// Whether force at equal depth differs between going in and coming out, by itself or as an
+    /// impossible delay.
     fn is_hysteretic(&self, line: &LineFit) -> bool {
         if (line[TAU] - self.params.delay).abs() > CLEARLY * self.params.delay_sigma {
             return true;
@@ -618,7 +616,7 @@ impl ForceCurve<'_> {
         let (Some((into, n)), Some((out, m))) = (mean(into), mean(out)) else {
             return false;
         };
-        // as it should be, not as the residuals have it, of which hysteresis is a part
+        // expected noise: the residuals contain the hysteresis
         let noise = self
             .params
             .force_noise

@@ -1,11 +1,10 @@
-//! An arm of any six to [`MOST_JOINTS`] turning joints one after the other, as a URDF describes it.
+//! A serial arm of six to [`MOST_JOINTS`] revolute joints, as in a URDF.
 //!
 //! T_Bi = Π_k O_k R(a_k, q_k): the origin of a joint in the frame of the one before, and a turn
-//! about its axis. The inverse is searched from joints near it, by steps Δq = Jᵀ (J Jᵀ + λ 1)⁻¹ e
-//! with λ in proportion to e² \[Sugihara 2011\]: far from a solution and near a singular pose the
-//! steps stay short, near a solution they are Newton's, and of the steps that lead there each is
-//! the shortest. A joint that would leave its range stays at the end of it, and the others do what
-//! is left.
+//! about its axis. The inverse is a search from nearby joints, by steps Δq = Jᵀ (J Jᵀ + λ 1)⁻¹ e
+//! with λ proportional to e² \[Sugihara 2011\]: far from a solution and near a singular pose the
+//! steps stay short, near a solution they are Newton's, and each is the shortest of all that lead
+//! there. A joint that would leave its range stays at its end, and the others do the remainder.
 
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
@@ -15,127 +14,126 @@ use nalgebra::{Isometry3, Matrix6, Point3, SMatrix, UnitQuaternion, UnitVector3,
 use super::capsule::Capsule;
 use super::joints::{Joints, MOST_JOINTS, largest_turn};
 
-/// Velocity of a frame by those of the joints: three rows of m/s, three of rad/s, a column for each
-/// joint, then zeros.
+/// Velocity of a frame by the joint velocities: three rows of m/s, three of rad/s, a column for
+/// each joint, then zeros.
 pub type Jacobian = SMatrix<f64, 6, MOST_JOINTS>;
 
-/// A joint that turns.
+/// A revolute joint.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ChainJoint {
-    /// as its states have it
+    /// name in the joint states
     pub name: Arc<str>,
-    /// its frame at zero, in the frame of the joint before; of the first in the base B
+    /// frame at zero angle, in the frame of the joint before; of the first joint in the base B
     pub origin: Isometry3<f64>,
-    /// in its frame
+    /// axis in the frame of the joint
     pub axis: UnitVector3<f64>,
-    /// smallest and largest angle, rad; `None`: it turns on and on
+    /// smallest and largest angle, rad; `None`: unlimited
     pub range: Option<[f64; 2]>,
 }
 
-/// What moves with a joint.
+/// A link that moves with a joint.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ChainLink {
-    /// as its maker has it
+    /// the maker's name
     pub name: Arc<str>,
-    /// the room that it takes up, in the frame of its joint; of the first link in B; `None`: from
-    /// joint to joint
+    /// body in the frame of its joint; of the first link in B; `None`: from joint to joint
     pub body: Option<Capsule>,
 }
 
-/// Why links and joints are no arm.
+/// Why links and joints make no arm.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ChainError {
-    /// Too few, or too many.
+    /// Too few joints, or too many.
     #[error(
         "the arm has {count} turning joints: from 6, which a probe needs to come from any side, to {MOST_JOINTS} are supported"
     )]
     Count {
-        /// of joints
+        /// number of joints
         count: usize,
     },
-    /// No link after each joint and one before the first.
+    /// Other links than one after each joint and one before the first.
     #[error("{count} joints need {} links, there are {links}", count + 1)]
     Links {
-        /// of joints
+        /// number of joints
         count: usize,
-        /// of links
+        /// number of links
         links: usize,
     },
-    /// A range without room, or what is no number.
+    /// A range without room, or a value that is no number.
     #[error("joint {name}: {what}")]
     Joint {
-        /// which
+        /// name of the joint
         name: Arc<str>,
-        /// what is wrong
+        /// its defect
         what: &'static str,
     },
-    /// Nothing can be thinner than nothing.
+    /// A radius out of range.
     #[error("a link has a radius of {radius_mm} mm: give one above 0 and up to 1000 mm")]
     Radius {
-        /// mm
+        /// radius, mm
         radius_mm: f64,
     },
 }
 
-/// Why no joint angles are found for a pose.
+/// Why a pose has no joint angles.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Unreached {
-    /// too far, or turned as it cannot be
+    /// too far, or in an impossible orientation
     Pose,
-    /// but for the range of a joint
+    /// reachable but for the range of a joint
     Range {
-        /// by name
+        /// name of the joint
         joint: Arc<str>,
-        /// rad
+        /// its range, rad
         range: [f64; 2],
     },
 }
 
-/// An arm.
+/// A serial arm.
 ///
-/// Joints have names of their own, ranges with room, and axes of one metre to a relative 10⁻¹²;
-/// links take up a capsule each.
+/// Joints have unique names, ranges with room, and axes of one metre to a relative 10⁻¹²; links
+/// have a capsule each.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SerialChain {
     joints: Vec<ChainJoint>,
     links: Vec<(Arc<str>, Capsule)>,
-    /// of the flange in the frame of the last joint
+    /// flange in the frame of the last joint
     end: Isometry3<f64>,
-    /// pairs of links that may meet; the number after the last is the flange, as a point
+    /// pairs of links that may collide; the number after the last is the flange, as a point
     meeting: Vec<(usize, usize)>,
-    /// from the second joint along all others to the flange, m
+    /// length from the second joint along all others to the flange, m
     reach: f64,
 }
 
 /// Poses of the frames of an arm in B.
 struct ChainFrames {
-    /// of each joint, turned
+    /// frame of each joint, turned
     joints: [Isometry3<f64>; MOST_JOINTS],
     flange: Isometry3<f64>,
 }
 
-/// No joint turns farther in one step of the search, rad.
+/// Maximum turn of a joint in one step of the search, rad.
 const STEP: f64 = 0.3;
-/// Steps of a search at most.
+/// Maximum number of steps of a search.
 const STEPS: usize = 100;
-/// A pose is reached when it is so near, in units of the reach and in rad: some thousand roundings.
+/// Error of a reached pose, in units of the reach and in rad: some thousand roundings.
 const REACHED: f64 = 1e-12;
-/// Damping in units of the squared error: of steps that help, and where it is given up.
+/// Damping in units of the squared error: after steps that help, and at which the search gives up.
 const DAMPING: [f64; 2] = [1e-3, 1e6];
-/// By this factor it grows where a step does not help, and falls where one does.
+/// Factor of the damping: up after a step that fails, down after a step that helps.
 const MORE: f64 = 10.0;
-/// Of the square of the smallest singular value that counts: rounding.
+/// Least damping, the square of the smallest singular value that counts: rounding.
 const LEAST_DAMPING: f64 = 1e-16;
-/// A pose that is not reached from near joints is gone to in so many parts.
+/// Parts of the path to a pose that a search from nearby joints does not reach.
 const PARTS: usize = 16;
-/// Then it is searched from so many configurations spread over the ranges.
+/// Start configurations across the ranges, for a pose that the path does not reach either.
 const CONFIGURATIONS: usize = 32;
-/// In so many configurations is looked for one in which two links are clear of each other.
+/// Configurations tried to find two links clear of each other.
 const MEETINGS: usize = 256;
 
 impl SerialChain {
-    /// - `links`: before the first joint, and after each.
-    /// - `end`: of the flange in the frame of the last joint.
+    /// - `links`: one before the first joint, and one after each.
+    /// - `end`: flange in the frame of the last joint.
     /// - `radius`: of links without a body, m.
     ///
     /// # Errors
@@ -222,8 +220,8 @@ impl SerialChain {
         Ok(chain)
     }
 
-    /// Pairs of links that share no joint, and are clear of each other in some configuration: what
-    /// never is lies side by side.
+    /// Pairs of links that share no joint, and are clear of each other in some configuration: any
+    /// other pair lies side by side.
     fn meeting(&self) -> Vec<(usize, usize)> {
         let last = self.links.len();
         let pairs = (0..=last).flat_map(|one| (one + 2..=last).map(move |other| (one, other)));
@@ -241,7 +239,7 @@ impl SerialChain {
         meeting
     }
 
-    /// A configuration of a sequence that fills the ranges evenly \[Halton 1960\].
+    /// Configuration of a sequence that fills the ranges evenly \[Halton 1960\].
     fn configuration(&self, number: usize) -> Joints {
         const BASES: [usize; MOST_JOINTS] = [2, 3, 5, 7, 11, 13, 17, 19];
         self.middle().mapped(|joint, _| {
@@ -270,17 +268,17 @@ impl SerialChain {
         })
     }
 
-    /// Its joints, from the base on.
+    /// Joints, from the base on.
     pub fn joints(&self) -> &[ChainJoint] {
         &self.joints
     }
 
-    /// Names of its links, from the base on.
+    /// Names of the links, from the base on.
     pub(super) fn link_names(&self) -> impl Iterator<Item = &Arc<str>> {
         self.links.iter().map(|(name, _)| name)
     }
 
-    /// Pairs of links that may meet, by their numbers; after the last link comes the probe.
+    /// Pairs of links that may collide, by number; the probe comes after the last link.
     pub(super) fn meeting_links(&self) -> &[(usize, usize)] {
         &self.meeting
     }
@@ -302,7 +300,7 @@ impl SerialChain {
         self.frames(joints).flange
     }
 
-    /// Velocity of the flange by those of the joints, in B.
+    /// Velocity of the flange by the joint velocities, in B.
     pub fn jacobian(&self, joints: &Joints) -> Jacobian {
         self.jacobian_at(&self.frames(joints))
     }
@@ -321,12 +319,12 @@ impl SerialChain {
         jacobian
     }
 
-    /// Distance of the arm from a singularity: the smallest singular value of its Jacobian, lengths
-    /// in units of the arm from its second joint on.
+    /// Distance from a singularity: the smallest singular value of the Jacobian, lengths in units
+    /// of the arm from its second joint on.
     pub fn dexterity(&self, joints: &Joints) -> f64 {
         let mut jacobian = self.jacobian(joints);
         jacobian.rows_mut(0, 3).scale_mut(1.0 / self.reach);
-        // of six rows, whatever columns of zeros there are
+        // six rows, for any number of zero columns
         (jacobian * jacobian.transpose())
             .symmetric_eigenvalues()
             .min()
@@ -334,7 +332,7 @@ impl SerialChain {
             .sqrt()
     }
 
-    /// The capsules of its links in B, from the base on, then the probe.
+    /// Capsules of the links in B, from the base on, then the probe.
     ///
     /// - `pose_ft`: the tip in the flange; `None`: the flange alone, as a point.
     pub(super) fn bodies(&self, joints: &Joints, pose_ft: Option<&Isometry3<f64>>) -> Vec<Capsule> {
@@ -353,7 +351,7 @@ impl SerialChain {
         links.chain([probe]).collect()
     }
 
-    /// The smallest gap between links that may meet, m.
+    /// Smallest gap between links that may collide, m.
     fn own_gap(&self, joints: &Joints) -> f64 {
         let bodies = self.bodies(joints, None);
         self.meeting
@@ -362,11 +360,11 @@ impl SerialChain {
             .fold(f64::INFINITY, f64::min)
     }
 
-    /// Joint angles within their ranges that bring the flange to a pose in B, near others.
+    /// Joint angles within their ranges that bring the flange to a pose in B, near `near`.
     ///
-    /// From a pose nearby they are the nearest ones to first order; where a search from there does
-    /// not lead to it, those of a straight way, and then the nearest of some searches from all over
-    /// the ranges.
+    /// For a nearby pose they are the nearest to first order; if a search from `near` fails, they
+    /// come from a straight path, and then from the nearest of some searches from all over the
+    /// ranges.
     ///
     /// # Errors
     /// [`Unreached`]
@@ -399,8 +397,8 @@ impl SerialChain {
         nearest.ok_or(unreached)
     }
 
-    /// The joint angles of a pose in B, of those that searches from all over the ranges find, that
-    /// leave the arm most room to move, with its links clear of each other if there are such.
+    /// Joint angles of a pose in B with the largest dexterity, by searches from all over the
+    /// ranges, with links clear of each other if possible.
     pub(super) fn most_dexterous(&self, pose_bf: &Isometry3<f64>) -> Option<Joints> {
         let from_middle = self.search(pose_bf, &self.middle()).ok();
         let room = |joints: &Joints| (self.own_gap(joints) > 0.0, self.dexterity(joints));
@@ -416,12 +414,12 @@ impl SerialChain {
             .filter_map(move |number| self.search(pose_bf, &self.configuration(number)).ok())
     }
 
-    /// No flange is farther from the first joint, m.
+    /// Maximum distance of the flange from the first joint, m.
     fn reach_of_all(&self) -> f64 {
         self.joints[1].origin.translation.vector.norm() + self.reach
     }
 
-    /// The same angles, each within half a turn of another, as far as its range goes.
+    /// The same angles, each within half a turn of `near`, as far as its range allows.
     fn unwound(&self, joints: &Joints, near: &Joints) -> Joints {
         joints.mapped(|joint, angle| {
             let turned = angle + TAU * ((near[joint] - angle) / TAU).round();
@@ -432,7 +430,7 @@ impl SerialChain {
         })
     }
 
-    /// Searches joint angles for a pose from others.
+    /// Searches joint angles for a pose, from others.
     fn search(&self, pose_bf: &Isometry3<f64>, from: &Joints) -> Result<Joints, Unreached> {
         let mut joints = from.mapped(|joint, angle| match self.joints[joint].range {
             Some([low, high]) => angle.clamp(low, high),
@@ -478,14 +476,14 @@ impl SerialChain {
         Err(held.unwrap_or(Unreached::Pose))
     }
 
-    /// How far the flange is from a pose: in units of the reach, and in rad, in B.
+    /// Error of the flange: in units of the reach, and in rad, in B.
     fn error(&self, frames: &ChainFrames, pose_bf: &Isometry3<f64>) -> Vector6<f64> {
         let way = (pose_bf.translation.vector - frames.flange.translation.vector) / self.reach;
         let turn = (pose_bf.rotation * frames.flange.rotation.inverse()).scaled_axis();
         Vector6::new(way.x, way.y, way.z, turn.x, turn.y, turn.z)
     }
 
-    /// The joints after one step, all within their ranges.
+    /// Joints after one step, all within their ranges.
     fn step(
         &self,
         joints: &Joints,
@@ -496,7 +494,7 @@ impl SerialChain {
         let mut jacobian = self.jacobian_at(frames);
         jacobian.rows_mut(0, 3).scale_mut(1.0 / self.reach);
         let (mut left, mut next, mut is_held) = (*error, *joints, [false; MOST_JOINTS]);
-        // each round holds one joint more
+        // each round holds one more joint
         for _ in 0..=self.joints.len() {
             let turns = shortest(&jacobian, &left, damping)?;
             let share = (STEP / turns.amax()).min(1.0);
@@ -525,7 +523,7 @@ impl SerialChain {
     }
 }
 
-/// The shortest turns x with J x = v, damped: Jᵀ (J Jᵀ + λ 1)⁻¹ v.
+/// Shortest turns x with J x = v, damped: Jᵀ (J Jᵀ + λ 1)⁻¹ v.
 pub(super) fn shortest(
     jacobian: &Jacobian,
     velocity: &Vector6<f64>,

@@ -1,8 +1,8 @@
-//! A slide: the ball is pressed on the surface with a constant force and follows a path.
+//! A slide: the ball presses on the surface with a constant force and follows a path.
 //!
-//! The arm complies along the normal of the current station alone; along the path it is driven, and
-//! beside it it is held. The path says where to go, the force how deep: a surface that lies
-//! elsewhere than was thought by less than a ball is followed.
+//! The arm complies only along the normal of the current station; it is driven along the path, and
+//! held beside it. The path sets the direction, the force the depth: the ball follows a surface
+//! that is displaced by less than a ball.
 
 use nalgebra::{Isometry3, Unit, UnitQuaternion, Vector3};
 
@@ -14,13 +14,13 @@ use crate::probing::plan::Station;
 /// A planned slide, in B.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SlideTarget {
-    /// of the tip
+    /// orientation of the tip
     pub rotation: UnitQuaternion<f64>,
-    /// in their order, two at least
+    /// stations in order, at least two
     pub stations: Vec<Station>,
-    /// the ball is clear when it is so far from a station along its normal, m
+    /// distance from a station along its normal at which the ball is clear, m
     pub lift: f64,
-    /// the surface may be so far from where it was thought, m
+    /// allowed displacement of the surface, m
     pub give: f64,
 }
 
@@ -34,7 +34,7 @@ impl SlideTarget {
     }
 }
 
-/// How a slide ended.
+/// End of a slide.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum SlideEnding {
     /// at the last station
@@ -43,50 +43,50 @@ pub enum SlideEnding {
     /// no contact at the first station
     #[error("no surface where it begins")]
     NoSurface,
-    /// the surface was lost
+    /// surface lost
     #[error("lost the surface")]
     Lost,
-    /// an obstacle blocked the path
+    /// obstacle on the path
     #[error("something stood in the way")]
     Blocked,
 }
 
-/// A slide that was made.
+/// A completed slide.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SlideRecord {
-    /// how it ended
+    /// its end
     pub ending: SlideEnding,
-    /// when the ball began to move along and when it ended, by the arm's clock, ns
+    /// start and end of the motion along the path, by the arm's clock, ns
     pub stamps_ns: [i64; 2],
-    /// the last station reached
+    /// last station reached
     pub reached: usize,
     /// mean force along the normal, N
     pub mean_force: f64,
-    /// largest difference from what was set of the mean over a tenth of a second, N
+    /// largest difference of the mean force over a tenth of a second from the set force, N
     pub worst_force: f64,
-    /// of all, N
+    /// largest force of the slide, N
     pub peak_force: f64,
 }
 
-/// The force is averaged over this, s.
+/// Averaging time of the force, s.
 const WINDOW: f64 = 0.1;
-/// The ball goes along once the force has been within this share of what is set for a window …
+/// Share of the set force within which the force stays for a window before the ball moves along.
 const SETTLED: f64 = 0.2;
-/// … or after this, s.
+/// Time after which the ball moves along in any case, s.
 const SETTLING: f64 = 1.0;
-/// The normal turns no faster, rad/s: the force follows it.
+/// Maximum turn rate of the normal, rad/s: the force follows it.
 const TURNING: f64 = 2.0;
-/// The normal that is pressed along is no farther ahead than so many stations.
+/// Maximum lead of the pressed normal, in stations.
 const MOST_AHEAD: f64 = 2.0;
-/// A deviation from the path is corrected with this rate, 1/s.
+/// Rate of correction of a deviation from the path, 1/s.
 const BACK_TO_PATH: f64 = 5.0;
-/// Less than this share of the force for two windows is none.
+/// Share of the force below which, for two windows, there is no contact.
 const NONE: f64 = 0.25;
-/// More than this share of the force against the path is an obstacle: friction is less …
+/// Share of the force against the path above which there is an obstacle: friction is less.
 const AGAINST: f64 = 0.8;
-/// … in so many states in a row: noise is not.
+/// Consecutive states with such a force that make an obstacle: noise makes fewer.
 const BLOCKED: usize = 4;
-/// A slide may take so many times as long as it should, and so much longer, s.
+/// Time limit of a slide over its expected duration: factor and addition, s.
 const PATIENCE: (f64, f64) = (3.0, 2.0);
 
 const SLIDING: &str = "sliding over the surface";
@@ -95,26 +95,26 @@ const SLIDING: &str = "sliding over the surface";
 struct Slid<'a> {
     target: &'a SlideTarget,
     params: &'a TouchParams,
-    /// along the path, m/s
+    /// speed along the path, m/s
     speed: f64,
-    /// of the last command, m/s in B; by how much it may change with each, m/s
+    /// feed of the last command, m/s in B, and its largest change per command, m/s
     feed: Vector3<f64>,
     ramp: f64,
     station: usize,
-    /// when the ball began to move along and when it was seen last, ns
+    /// start of the motion along the path, and stamp of the last state, ns
     stamps_ns: [i64; 2],
-    /// of each state
+    /// normal force of each state
     forces: Vec<f64>,
-    /// states in a row without a surface, and with an obstacle
+    /// consecutive states without a surface, and with an obstacle
     none: usize,
     against: usize,
-    /// states of a window
+    /// states per window
     window: usize,
 }
 
 impl Slid<'_> {
-    /// The direction of the path at the current station, unit vector, and the length to the next
-    /// one, m.
+    /// Direction of the path at the current station, unit vector, and distance to the next station,
+    /// m.
     fn ahead(&self) -> (Vector3<f64>, f64) {
         let stations = &self.target.stations;
         let direction = stations[self.station + 1].centre - stations[self.station].centre;
@@ -124,7 +124,7 @@ impl Slid<'_> {
         )
     }
 
-    /// Goes on to the station that the ball has passed; whether there are more.
+    /// Advances to the station that the ball has passed; returns whether there are more.
     fn advance(&mut self, place: &Vector3<f64>) -> bool {
         while self.station + 1 < self.target.stations.len() {
             let (direction, length) = self.ahead();
@@ -146,8 +146,8 @@ impl Slid<'_> {
         }
     }
 
-    /// On along the path, and back to it where the ball is beside it; no faster than a slide may
-    /// be, and with no more than the acceleration that is allowed.
+    /// Command along the path, and back to it for a ball beside it; within the speed of a slide and
+    /// the allowed acceleration.
     fn command(&mut self, place: &Vector3<f64>) -> Command {
         let Station {
             centre,
@@ -158,7 +158,7 @@ impl Slid<'_> {
         let speed = self
             .speed
             .min(TURNING * length / here.angle(&next).max(f64::MIN_POSITIVE));
-        // where the ball is when the command takes effect: half of the latency is the transmission
+        // position of the ball when the command takes effect: half of the latency is transmission
         let gone = (place - centre.coords).dot(&direction) + speed * self.params.latency / 2.0;
         let share = (gone / length.max(f64::MIN_POSITIVE)).clamp(0.0, MOST_AHEAD);
         let normal = Unit::new_normalize(
@@ -172,7 +172,7 @@ impl Slid<'_> {
         self.press(&normal, self.feed)
     }
 
-    /// Keeps the state; how the slide ended, if it has.
+    /// Records the state; returns the end of the slide, if any.
     fn observe(&mut self, state: &ArmState) -> Option<SlideEnding> {
         let Station { centre, normal } = self.target.stations[self.station];
         let force = state.wrench_b.force.dot(&normal);
@@ -211,7 +211,7 @@ impl Watched<'_> {
     /// Slides once. The ball ends clear of the surface, beside the last station reached.
     ///
     /// # Errors
-    /// [`ProbeError`]; a surface that is not there, or ends, is none.
+    /// [`ProbeError`]; a surface that is missing, or ends, is none.
     pub fn slide(
         &mut self,
         target: &SlideTarget,
@@ -277,7 +277,7 @@ impl Watched<'_> {
         })
     }
 
-    /// Down to the surface at the first station; whether it is there.
+    /// Goes down to the surface at the first station; returns whether it is there.
     fn find_surface(
         &mut self,
         target: &SlideTarget,
@@ -299,7 +299,7 @@ impl Watched<'_> {
         })
     }
 
-    /// Presses until the force is what was set.
+    /// Presses until the force has its set value.
     fn settle(&mut self, slid: &Slid<'_>) -> Result<(), ProbeError> {
         let doing = "pressing before a slide";
         let normal = slid.target.stations[0].normal;

@@ -1,4 +1,4 @@
-//! How a touch is made: forces, speeds, and what its limits allow.
+//! Settings of a touch: forces, speeds, and the bounds that its limits set.
 
 use super::limits::Limits;
 use super::onset::OnsetParams;
@@ -11,12 +11,12 @@ parameters! {
     pub struct TouchParams in "robot" {
         /// Force that a touch presses with, no more than largest_force_n.
         ///
-        /// In N: of the second search.
+        /// In N, of the second search.
         force: f64 = 3.0, "touch_force_n" [N, 0.1, 100];
         /// Force at which a search stops: several deviations of its noise, no more than 0.8 of
         /// touch_force_n.
         ///
-        /// In N: of the first search.
+        /// In N, of the first search.
         trigger: f64 = 1.0, "trigger_n" [N, 0.05, 80];
         /// Speed through free air.
         ///
@@ -24,21 +24,21 @@ parameters! {
         link_speed: f64 = 50.0, "link_mm_per_s" [MM_PER_S, 0.1, 250];
         /// Speed while searching; slower where tip.stiffness_n_per_mm asks for it.
         ///
-        /// In m/s, at most: where arm and part are stiff it is slower, so that `force` is kept.
+        /// In m/s, maximum: a stiff arm and part reduce it, to keep `force`.
         search_speed: f64 = 10.0, "search_mm_per_s" [MM_PER_S, 0.1, 250];
         /// Speed while measuring.
         ///
-        /// In m/s: of the second search.
+        /// In m/s, of the second search.
         measure_speed: f64 = 2.0, "measure_mm_per_s" [MM_PER_S, 0.05, 250];
         /// Speed while the ball slides over what was found, at most.
         ///
         /// In m/s.
         slide_speed: f64 = 10.0, "slide_mm_per_s" [MM_PER_S, 0.1, 250];
-        /// Of all motions, m/s²; no more than that of the limits.
+        /// Acceleration of all motions, m/s²; no more than the limit.
         acceleration: f64 = Limits::default().acceleration;
-        /// How far above the contact the second search begins, m.
+        /// Height above the contact at which the second search begins, m.
         back_off: f64 = 0.3e-3;
-        /// Arm, probe and part together as far as is known, N/m.
+        /// Estimated stiffness of arm, probe and part together, N/m.
         stiffness: f64 = 15e3;
         /// Time from a contact to the beginning of braking.
         ///
@@ -46,12 +46,12 @@ parameters! {
         latency: f64 = 20.0, "latency_ms" [MS, 0, 200];
     }
     with {
-        /// Of the curve.
+        /// Settings of the onset fit.
         onset: OnsetParams,
     }
 }
 
-/// Share of the force of a touch at which a search may stop: the remainder is for its braking.
+/// Share of the touch force at which a search may stop: the remainder is for braking.
 const MOST_TRIGGER: f64 = 0.8;
 
 impl TouchParams {
@@ -92,7 +92,7 @@ impl TouchParams {
 
     /// Speed at which a search that stops at [`Self::trigger`] ends below [`Self::force`].
     ///
-    /// After the trigger the tip goes on by v τ + v²/2a, and each metre of it is k more: v = a
+    /// After the trigger the tip travels v τ + v²/2a, and the force grows by k per metre: v = a
     /// (√(τ² + 2 Δ/(k a)) − τ).
     pub(crate) fn safe_speed(&self) -> f64 {
         self.speed_below(self.force - self.trigger, self.acceleration)
@@ -100,8 +100,8 @@ impl TouchParams {
             .max(CRAWL)
     }
 
-    /// Speed at which whatever the tip meets is pressed with no more than the largest force, where
-    /// it stops as hard as it may once it feels a contact; m/s.
+    /// Speed at which any obstacle is pressed with no more than the largest force, if the arm stops
+    /// as hard as it may on contact; m/s.
     pub(crate) fn bounded_speed(&self, limits: &Limits) -> f64 {
         self.speed_below(
             limits.force - UNEXPECTED * self.trigger,
@@ -111,15 +111,14 @@ impl TouchParams {
         .max(CRAWL)
     }
 
-    /// - `room`: by which the force may grow, N; `deceleration`: m/s².
+    /// - `room`: allowed growth of the force, N; `deceleration`: m/s².
     fn speed_below(&self, room: f64, deceleration: f64) -> f64 {
         let (way, late) = (room.max(0.0) / self.stiffness, self.latency);
         deceleration * ((late * late + 2.0 * way / deceleration).sqrt() - late)
     }
 }
 
-/// In a fast move the sensor also measures accelerations: more force than this many triggers is a
-/// contact.
+/// Force of a contact in a fast move, in triggers: the sensor then also measures accelerations.
 pub const UNEXPECTED: f64 = 1.5;
-/// No search is slower, m/s: it would never end.
+/// Minimum speed of a search, m/s: a slower one would never end.
 pub const CRAWL: f64 = 0.1e-3;

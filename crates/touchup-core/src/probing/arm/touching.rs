@@ -1,7 +1,7 @@
 //! One touch: approach, search, back off, a slower search, retract.
 //!
-//! The first search finds the surface; the second comes from just above it, slowly, presses to the
-//! set force, and goes back through the corner at the same speed. Its curve is the input of
+//! The first search finds the surface; the second starts just above it, presses slowly to the set
+//! force, and returns through the corner at the same speed. Its curve is the input of
 //! [`find_onset`].
 
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
@@ -17,13 +17,13 @@ use super::watched::{ProbeError, TRIGGERS, Watched};
 /// A planned touch, in B.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TouchTarget {
-    /// Where the search begins: the pose of the tip, clear of the part.
+    /// Start of the search: pose of the tip, clear of the part.
     pub standoff_bt: Isometry3<f64>,
-    /// Along which it is searched, into the part.
+    /// Direction of the search, into the part.
     pub direction: Unit<Vector3<f64>>,
-    /// How far, m.
+    /// Length of the search, m.
     pub search: f64,
-    /// Where the surface will be, as predicted from the touches so far.
+    /// Position of the surface, predicted from earlier touches.
     pub expected: Option<Expected>,
 }
 
@@ -32,38 +32,38 @@ pub struct TouchTarget {
 pub enum TouchOutcome {
     /// The ball touched the part.
     Contact {
-        /// where the curve bends
+        /// corner of the curve
         onset: Onset,
         /// centre of the ball at the onset, m in B
         centre: Point3<f64>,
-        /// mean force of the part on the tip while pressed by more than half of the most, N in B
+        /// mean force of the part on the tip above half of the largest, N in B
         force_b: Vector3<f64>,
     },
     /// No contact along the whole search.
     Miss {
-        /// how far the ball went from the stand-off, m
+        /// travel of the ball from the stand-off, m
         travel: f64,
     },
     /// A contact whose curve has no onset.
     Unclear(OnsetError),
 }
 
-/// A touch with all that was seen of it.
+/// A touch with all its data.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TouchRecord {
-    /// as planned
+    /// planned touch
     pub target: TouchTarget,
-    /// when it began and ended, by the arm's clock, ns
+    /// start and end by the arm's clock, ns
     pub stamps_ns: [i64; 2],
-    /// of the measuring search, m/s
+    /// speed of the measuring search, m/s
     pub speed: f64,
-    /// of the measuring search, in and out
+    /// curve of the measuring search, in and out
     pub curve: Vec<TouchMoment>,
-    /// when it begins, by the arm's clock, ns
+    /// start of the curve by the arm's clock, ns
     pub curve_ns: i64,
-    /// of all, N
+    /// largest force of the whole touch, N
     pub peak_force: f64,
-    /// its outcome
+    /// outcome of the touch
     pub outcome: TouchOutcome,
 }
 
@@ -112,7 +112,7 @@ impl Watched<'_> {
         };
         let mut states = Vec::new();
         let mut outcome = None;
-        // where the surface is known it is measured at once, from just above it
+        // a predicted surface needs no first search, only a measurement from just above it
         let known = target
             .expected
             .map(|expected| (expected.travel, KNOWN * expected.sigma + params.back_off));
@@ -140,7 +140,7 @@ impl Watched<'_> {
                 let is_free = self.back_off(&line)?;
                 match is_free && self.press(&line, SECOND * params.back_off, &mut states)? {
                     true => line.outcome_of(&states),
-                    // the first search made a contact that the second did not
+                    // contact in the first search, but not in the second
                     false => {
                         let peak_n = states
                             .iter()
@@ -159,7 +159,7 @@ impl Watched<'_> {
                 TouchOutcome::Miss { travel: reached }
             }
         };
-        // on the retraction the part may be in contact
+        // the retraction may begin in contact
         self.leave("retracting", &target.standoff_bt, params.link_speed, params)?;
         let ended = self.last.map_or(begun, |state| state.stamp_ns);
         Ok(TouchRecord {
@@ -173,7 +173,7 @@ impl Watched<'_> {
         })
     }
 
-    /// A part pushes: where it pulls, the force has the other sign.
+    /// A part pushes: a pull shows the wrong sign of the force.
     ///
     /// - `force_b`: mean while the arm came to rest, N.
     fn check_sign(
@@ -195,9 +195,9 @@ impl Watched<'_> {
         Err(ProbeError::Pulls { doing, force_n })
     }
 
-    /// Free of the surface again, then a little farther.
+    /// Backs off until free of the surface, then a little farther.
     ///
-    /// No farther than the stand-off: whether it is free there.
+    /// The stand-off ends it; returns whether the tip is free.
     fn back_off(&mut self, line: &ApproachLine) -> Result<bool, ProbeError> {
         let (params, slow) = (line.params, line.along(self.slow(line)));
         let way_back = self
@@ -215,10 +215,10 @@ impl Watched<'_> {
         Ok(is_free)
     }
 
-    /// The measuring search, from just above the surface, in and out; whether it reached the wanted
-    /// force.
+    /// Measuring search, from just above the surface, in and out; returns whether it reached the
+    /// set force.
     ///
-    /// - `room`: so far away the surface is at most, m.
+    /// - `room`: largest distance of the surface, m.
     fn press(
         &mut self,
         line: &ApproachLine,
@@ -267,7 +267,7 @@ impl Watched<'_> {
             .min(self.limits.speed)
     }
 
-    /// Force by which a search goes beyond where it is stopped, N.
+    /// Overshoot of the force after the stop of a search, N.
     fn overshoot(&self, params: &TouchParams, speed: f64) -> f64 {
         let acceleration = params.acceleration.min(self.limits.acceleration);
         let most = params.stiffness * speed * (params.latency + speed / (2.0 * acceleration));
@@ -275,7 +275,7 @@ impl Watched<'_> {
     }
 }
 
-/// The line that a touch is made along.
+/// Line of a touch.
 struct ApproachLine<'a> {
     start: Vector3<f64>,
     target: &'a TouchTarget,
@@ -283,28 +283,28 @@ struct ApproachLine<'a> {
 }
 
 impl ApproachLine<'_> {
-    /// So much along it.
+    /// Vector of this length along the line.
     fn along(&self, by: f64) -> Vector3<f64> {
         self.target.direction.into_inner() * by
     }
 
-    /// How far the ball has come, m.
+    /// Travel of the ball, m.
     fn depth(&self, state: &ArmState) -> f64 {
         (state.pose_bt.translation.vector - self.start).dot(&self.target.direction)
     }
 
-    /// Force against it, N.
+    /// Force against the approach, N.
     fn presses(&self, state: &ArmState) -> f64 {
         -state.wrench_b.force.dot(&self.target.direction)
     }
 
-    /// Force that makes a contact, N: against the approach, or aside where a wall is met at a flat
-    /// angle or a rim is slid down.
+    /// Contact force, N: against the approach, or aside at a wall met at a flat angle or on the way
+    /// down a rim.
     fn felt(&self, state: &ArmState) -> f64 {
         self.presses(state).max(state.wrench_b.force.norm() / ASIDE)
     }
 
-    /// - `axis`: along which the force is taken, unit vector in B.
+    /// - `axis`: of the force, unit vector in B.
     fn curve(&self, states: &[ArmState], axis: &Vector3<f64>) -> Vec<TouchMoment> {
         let begun = states.first().map_or(0, |state| state.stamp_ns);
         let moment = |state: &ArmState| {
@@ -320,8 +320,8 @@ impl ApproachLine<'_> {
         states.iter().map(moment).collect()
     }
 
-    /// Along which the contact pushes, unit vector in B: against the approach; where a wall is met
-    /// at a flat angle, along the force, which bends at the same travel and is the larger.
+    /// Direction of the contact's push, unit vector in B: against the approach; for a wall met at a
+    /// flat angle, along the force, which bends at the same travel and is larger.
     fn contact_axis(&self, states: &[ArmState]) -> Vector3<f64> {
         let back = -self.along(1.0);
         let norm = |state: &ArmState| state.wrench_b.force.norm();
@@ -339,14 +339,14 @@ impl ApproachLine<'_> {
         }
     }
 
-    /// The outcome of a curve that reached the wanted force.
+    /// Outcome of a curve that reached the set force.
     fn outcome_of(&self, states: &[ArmState]) -> TouchOutcome {
         let axis = self.contact_axis(states);
         let onset = match find_onset(&self.curve(states, &axis), &self.params.onset) {
             Ok(onset) => onset,
             Err(error) => return TouchOutcome::Unclear(error),
         };
-        // the line that the ball went along, by all poses of the curve
+        // line of the ball, by all poses of the curve
         let aside = mean(states.iter().map(|state| {
             let gone = state.pose_bt.translation.vector - self.start;
             gone - self.along(gone.dot(&self.target.direction))
@@ -368,20 +368,20 @@ impl ApproachLine<'_> {
     }
 }
 
-/// A ball is stopped as well when its whole force is more than this many times the limit along its
-/// direction: a wall that it meets at 45° pushes √2 times as much.
+/// Total force that also stops the ball, over the limit along its direction: a wall met at 45°
+/// pushes √2 times as much.
 const ASIDE: f64 = 1.42;
-/// A wall whose push is more than 33° from the approach is met at a flat angle (cosine).
+/// Cosine of 33°: a wall whose push is farther from the approach is met at a flat angle.
 const FLAT: f64 = 0.8387;
-/// A contact that pulls by more than this share of its force has the wrong sign.
+/// Pull of a contact, over its force, that shows a wrong sign.
 const PULLS: f64 = 0.7;
-/// Where the surface is known to so many standard deviations it is not searched first …
+/// Standard deviations of margin above a predicted surface, without a first search.
 const KNOWN: f64 = 4.0;
-/// … as long as they leave no more room than this, over the back-off.
+/// Maximum margin above a predicted surface without a first search, over the back-off.
 const MOST_ROOM: f64 = 3.0;
-/// The retraction is this much faster than the measuring search.
+/// Speed of the retraction, over the measuring search.
 const BACK: f64 = 2.0;
-/// Below this share of the trigger the tip is free.
+/// Share of the trigger below which the tip is free.
 const FREE: f64 = 0.5;
-/// The second search goes this much farther than it should have to.
+/// Length of the second search, over the necessary one.
 const SECOND: f64 = 3.0;

@@ -1,4 +1,4 @@
-//! An arm that is watched while it moves: each state is checked before the next is awaited; a fault
+//! Supervision of a moving arm: each state passes the checks before the wait for the next; a fault
 //! stops the arm first and is reported second.
 
 use std::collections::VecDeque;
@@ -12,26 +12,26 @@ use super::measured_motion::MeasuredMotion;
 use super::touch_params::{TouchParams, UNEXPECTED};
 use crate::numeric::mean;
 
-/// Why probing was broken off. The arm was commanded to stop before this was made.
+/// Why probing ended early. The stop command to the arm comes before this error.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ProbeError {
-    /// The arm.
+    /// A fault of the arm.
     #[error("while {doing}: {error}")]
     Arm {
         /// the motion or measurement at hand
         doing: &'static str,
-        /// what it said
+        /// its error
         error: ArmError,
     },
-    /// A limit.
+    /// A limit exceeded.
     #[error("while {doing}: {error}")]
     Limit {
         /// the motion or measurement at hand
         doing: &'static str,
-        /// which
+        /// limit and excess
         error: LimitError,
     },
-    /// The sensor is not zeroed.
+    /// A force at rest too large for zeroing the sensor.
     #[error(
         "while {doing}: the sensor feels {force_n:.1} N at rest, and is zeroed below {most_n:.1} N only: free the tip, or tell the \
          arm what it holds (`touchup calibrate payload`)"
@@ -39,19 +39,19 @@ pub enum ProbeError {
     Loaded {
         /// the motion or measurement at hand
         doing: &'static str,
-        /// N
+        /// force at rest, N
         force_n: f64,
-        /// N
+        /// largest force for zeroing, N
         most_n: f64,
     },
-    /// Nor where what it feels changes.
+    /// A force at rest that changes during zeroing.
     #[error(
         "while {doing}: what the sensor feels at rest changes by {change_n:.1} N: something moves the tip, or its cable"
     )]
     Unsteady {
         /// the motion or measurement at hand
         doing: &'static str,
-        /// N
+        /// change, N
         change_n: f64,
     },
     /// The part pulls.
@@ -62,23 +62,23 @@ pub enum ProbeError {
     Pulls {
         /// the motion or measurement at hand
         doing: &'static str,
-        /// N
+        /// pull, N
         force_n: f64,
     },
-    /// An obstacle where the path should be clear.
+    /// An obstacle on a supposedly clear path.
     #[error("while {doing}: up to {force_n:.1} N at ({:.1} {:.1} {:.1}) mm, where the path is clear by the mesh; look what is there",
             place_mm[0], place_mm[1], place_mm[2])]
     Obstacle {
         /// the motion or measurement at hand
         doing: &'static str,
-        /// until the arm stood, N
+        /// largest force until the arm stood, N
         force_n: f64,
-        /// of the tip in B, when it was felt, mm
+        /// position of the tip in B at the contact, mm
         place_mm: [f64; 3],
-        /// whether that was in a fast move through free air
+        /// whether the move was a fast one through free air
         is_link: bool,
     },
-    /// Noise would be contact.
+    /// Noise of the force that would count as contact.
     #[error(
         "while {doing}: the force has a noise of {noise_n:.2} N rms at rest, so no contact of {trigger_n:.2} N can be told from it: raise \
          robot.trigger_n to {least_n:.1} N with touch_force_n above it, or look what shakes the sensor"
@@ -86,14 +86,14 @@ pub enum ProbeError {
     Noisy {
         /// the motion or measurement at hand
         doing: &'static str,
-        /// N
+        /// noise of the force at rest, N rms
         noise_n: f64,
-        /// N
+        /// set trigger, N
         trigger_n: f64,
-        /// N
+        /// smallest usable trigger, N
         least_n: f64,
     },
-    /// Its reading in free air has left zero.
+    /// A drift of the reading in free air.
     #[error(
         "while {doing}: {force_n:.2} N in free air {seconds:.0} s after the sensor was zeroed, {per_s:.2} N/s: it drifts (warms up, or \
          its cable pulls), so contacts of {trigger_n:.2} N cannot be told from that; let it warm up, or look at the cable"
@@ -101,16 +101,16 @@ pub enum ProbeError {
     Drifts {
         /// the motion or measurement at hand
         doing: &'static str,
-        /// N
+        /// reading in free air, N
         force_n: f64,
-        /// s
+        /// time since zeroing, s
         seconds: f64,
-        /// N/s
+        /// drift, N/s
         per_s: f64,
-        /// N
+        /// trigger, N
         trigger_n: f64,
     },
-    /// The sensor does not sense.
+    /// A stuck force sensor.
     #[error(
         "while {doing}: the force sensor {stuck}, and no sensor is without noise: look at its cable, its range and its driver, \
          zero it, and check it by hand (docs/probing.md)"
@@ -118,10 +118,10 @@ pub enum ProbeError {
     Senseless {
         /// the motion or measurement at hand
         doing: &'static str,
-        /// its readings
+        /// stuck reading
         stuck: StuckForce,
     },
-    /// A contact that was touched again is not where it was.
+    /// A reference contact that has moved.
     #[error(
         "while {doing}: {reference} {how}, so the probe is bent or loose, the part has slipped, the arm has drifted or its sensor feels \
          less, some time after {since}: nothing that was touched after that holds; look, calibrate tip and place anew, and probe it again"
@@ -129,11 +129,11 @@ pub enum ProbeError {
     Displaced {
         /// the motion or measurement at hand
         doing: &'static str,
-        /// which contact
+        /// name of the contact
         reference: String,
-        /// how it is now
+        /// its change
         how: String,
-        /// the last touch that holds
+        /// last valid touch
         since: String,
     },
     /// States come too seldom to stop in time.
@@ -143,9 +143,9 @@ pub enum ProbeError {
     LowRate {
         /// the motion or measurement at hand
         doing: &'static str,
-        /// ms
+        /// gap between states, ms
         gap_ms: f64,
-        /// ms
+        /// required period, ms
         period_ms: f64,
     },
     /// A motion does not end.
@@ -153,87 +153,85 @@ pub enum ProbeError {
     TooLong {
         /// the motion or measurement at hand
         doing: &'static str,
-        /// s
+        /// time limit, s
         limit_s: f64,
-        /// by what, where it says so
+        /// causes, if the arm reports them
         slowed: Option<Slowed>,
     },
-    /// A request stopped it.
+    /// A stop on request.
     #[error("cancelled while {doing}")]
     Cancelled {
         /// the motion or measurement at hand
         doing: &'static str,
-        /// what was asked for
+        /// the request
         request: StopRequest,
     },
 }
 
-/// States with equal stamps before that is a fault.
+/// Equal stamps in a row that make a fault.
 const FROZEN: u32 = 5;
-/// States may come this many periods apart.
+/// Maximum gap between states, in periods.
 const LATE: f64 = 10.0;
-/// An arm is at rest when it is not farther than this from where it was [`REST_STATES`] before, m:
-/// above the noise of what is reported. At 500 Hz that is 3 mm/s, from which 0.5 m/s² stop within 9
-/// µm.
+/// Maximum distance from the position [`REST_STATES`] before for an arm at rest, m: above the noise
+/// of reported positions. At 500 Hz that is 3 mm/s, from which 0.5 m/s² stop within 9 µm.
 const REST: f64 = 60e-6;
-/// States over which rest is tested.
+/// States in the test for rest.
 const REST_STATES: usize = 10;
-/// A line has ended within this of its end, m.
+/// Distance from its end at which a line has arrived, m.
 const THERE: f64 = 80e-6;
-/// … and this, rad.
+/// Angle from its end at which a line has arrived, rad.
 const TURNED: f64 = 2e-3;
-/// A line also takes as long as its turn at this speed, rad/s.
+/// Turn rate that the time limit of a line allows for, rad/s.
 const TURN_SPEED: f64 = 0.2;
-/// Longer than it should take by this factor, and by this time (s), is too long.
+/// Time limit of a motion over its expected duration: factor and addition, s.
 const PATIENCE: (f64, f64) = (3.0, 2.0);
-/// Below this the tip is free of what it met, N …
+/// Force below which the tip is free, N.
 const FREE_N: f64 = 1.0;
-/// … and where it grows by this on the way back the tip goes no farther, N: several deviations of
-/// its noise …
+/// Growth of the force that ends the retreat, N: several deviations of its noise.
 const WORSE_N: f64 = 2.0;
-/// … to which it goes back with this speed, m/s …
+/// Speed of the retreat, m/s.
 const FREEING: f64 = 2e-3;
-/// … by no more than this, m: what an arm goes on while it brakes, and what it bends.
+/// Maximum length of the retreat, m: travel of the arm while braking, and its bending.
 const FREEING_WAY: f64 = 5e-3;
-/// A force with less than this share along the way comes from a surface beside it: the way back is
-/// along that surface as well.
+/// Share of the force along the path below which the surface is beside it: the retreat is along
+/// that surface as well.
 const BESIDE: f64 = std::f64::consts::FRAC_1_SQRT_2;
-/// So often on one way the tip is freed of what is beside it, and goes on …
+/// Maximum number of times that the tip leaves a surface beside one path and goes on.
 const GRAZES: u32 = 3;
-/// … this much farther from it than where it was free, m: more than the noise of its place.
+/// Additional distance from such a surface, m: more than the noise of positions.
 const OFF: f64 = 0.1e-3;
-/// A sensor is looked at for so long before it is zeroed, s.
+/// Duration of the check before zeroing, s.
 const STEADY: f64 = 0.1;
-/// In which its mean may change by this, N …
+/// Allowed change of the mean force during this check, N.
 const DRIFT: f64 = 0.2;
-/// … and by this many of its standard deviations.
+/// Additional allowed change, in its standard deviations.
 const CHANGED: f64 = 3.0;
-/// Forces above the trigger in a row that are contact; one alone is noise.
+/// Consecutive forces above the trigger that make a contact; one alone is noise.
 pub(super) const TRIGGERS: u32 = 2;
 
-/// How an arm is asked to stop; the later one outranks the one before it.
+/// Request to stop an arm; the later variant outranks the earlier.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
 pub enum StopRequest {
-    /// At once; then back into free air.
+    /// Stop at once, then retract into free air.
     #[error("the arm stopped and retracted")]
     Retract,
-    /// At once, and nothing more moves, no retraction either.
+    /// Stop at once, without any further motion, also no retraction.
     #[error("the arm stopped and stays where it is")]
     Stay,
 }
 
-/// Observes an arm while it moves.
+/// Observer of a moving arm.
 pub trait Observer {
-    /// Receives each state, in their order.
+    /// Receives each state, in order.
     fn on_state(&mut self, state: &ArmState);
 
-    /// Is asked after each state whether to stop.
+    /// Request to stop, polled after each state.
     fn stop_request(&self) -> Option<StopRequest> {
         None
     }
 }
 
-/// An arm that is watched while it moves.
+/// A supervised arm.
 pub struct Watched<'a> {
     pub(super) arm: &'a mut dyn Arm,
     pub(crate) limits: Limits,
@@ -243,17 +241,17 @@ pub struct Watched<'a> {
     liveness: Liveness,
     motion: MeasuredMotion,
     pub(super) peak_force: f64,
-    /// The station that the ball has come to on the current slide, also where that breaks off; of a
-    /// touch 0 from its stand-off on. `None` while it is not at the first.
+    /// Last station that the ball has reached on the current slide, also if the slide ended early;
+    /// of a touch 0 from its stand-off on. `None` before the first.
     pub reached: Option<usize>,
-    /// the least request that stops it: a retraction goes on unless it has to stay
+    /// least request that stops the arm: a retraction goes on unless it has to stay
     pub(crate) heeds: StopRequest,
-    /// whether it comes free of a contact: then no force stops it
+    /// whether the arm is coming free of a contact: then no force stops it
     comes_free: bool,
 }
 
 impl<'a> Watched<'a> {
-    /// - `observer`: receives each state, and may stop it.
+    /// - `observer`: receives each state, and may stop the arm.
     pub fn new(arm: &'a mut dyn Arm, limits: Limits, observer: &'a mut dyn Observer) -> Self {
         let (peak_force, heeds) = (0.0, StopRequest::Retract);
         let motion = MeasuredMotion::default();
@@ -272,18 +270,17 @@ impl<'a> Watched<'a> {
         }
     }
 
-    /// The largest force of the current touch, or of all lines where there was none, N; and when
-    /// the arm was seen last, by its clock, ns: `None` where it was not, or not since the sensor
-    /// was zeroed.
+    /// Largest force of the current touch, or of all lines without a touch, N; and stamp of the
+    /// last state by the arm's clock, ns: `None` without a state since the start or since zeroing.
     pub(crate) fn seen(&self) -> (f64, Option<i64>) {
         (self.peak_force, self.last.map(|state| state.stamp_ns))
     }
 
-    /// The next state, if it is valid.
+    /// Next state, after all checks.
     pub(super) fn next(&mut self, doing: &'static str) -> Result<ArmState, ProbeError> {
         let result = self.look(doing);
         if result.is_err() {
-            // stop first, report second; where no command gets through, its watchdog stops it
+            // stop first, report second; if no command gets through, the arm's watchdog stops it
             let _ = self.arm.command(&self.hard_stop());
         }
         result
@@ -363,10 +360,10 @@ impl<'a> Watched<'a> {
             .map_err(|error| ProbeError::Arm { doing, error })
     }
 
-    /// Repeats a command, as the watchdog of the arm needs it, until a state gives a result.
+    /// Repeats a command, as the arm's watchdog requires, until a state gives a result.
     ///
-    /// - `begun_ns`: when the motion began; `None`: with its first state. `limit_s`: it ends within
-    ///   this, or has failed.
+    /// - `begun_ns`: start of the motion; `None`: with its first state. `limit_s`: time limit of
+    ///   the motion.
     pub(super) fn repeat<T>(
         &mut self,
         doing: &'static str,
@@ -399,12 +396,12 @@ impl<'a> Watched<'a> {
         }
     }
 
-    /// Brakes as hard as it may, and goes back the way it came until nothing is felt any more; of a
-    /// surface beside the way, off that surface.
+    /// Brakes as hard as allowed, and goes back along the path until free; from a surface beside
+    /// the path, off that surface.
     ///
-    /// Returns how far beside the way it is to go on, m in B, where it went aside and is free.
+    /// Returns the offset beside the path for going on, m in B, after coming free sideways.
     ///
-    /// - `command`: that led to the contact.
+    /// - `command`: motion that led to the contact.
     pub(super) fn come_free(
         &mut self,
         command: &Command,
@@ -430,7 +427,7 @@ impl<'a> Watched<'a> {
             return Ok(None);
         };
         let is_free = |state: &ArmState| state.wrench_b.force.norm() < FREE_N;
-        // what was passed while it braked pushes no more
+        // an obstacle passed while braking pushes no more
         let push = if is_free(&stood) { met } else { stood }.wrench_b.force;
         let (along, met_n) = (push.dot(&way), push.norm());
         let aside = (push - way * along)
@@ -445,10 +442,10 @@ impl<'a> Watched<'a> {
         Ok(by.map(|(gone, aside)| aside * (gone.dot(&aside).max(0.0) + OFF)))
     }
 
-    /// Slowly in a direction, until nothing is felt or more than what was met.
+    /// Goes slowly in a direction, until free or until the force exceeds `met_n`.
     ///
     /// - `direction`: unit vector in B.
-    /// - `met_n`: N
+    /// - `met_n`: force at the obstacle, N
     fn go_until_free(
         &mut self,
         doing: &'static str,
@@ -459,7 +456,7 @@ impl<'a> Watched<'a> {
         self.search(doing, direction * FREEING, FREEING_WAY, &mut |state| {
             let force_n = state.wrench_b.force.norm();
             free = if force_n < FREE_N { free + 1 } else { 0 };
-            // what was met is not that way, or was no contact
+            // the direction is not off the obstacle, or there was no contact
             worse = if force_n > met_n + WORSE_N {
                 worse + 1
             } else {
@@ -470,13 +467,13 @@ impl<'a> Watched<'a> {
         self.stand(doing, &self.stop(), &mut |_| {})
     }
 
-    /// Goes straight to a pose through what should be free air.
+    /// Goes straight to a pose through supposedly free air.
     ///
     /// # Errors
-    /// [`ProbeError`]; [`ProbeError::Obstacle`] when the force exceeds `trigger` (N): the arm has
-    /// stopped, and come free of it.
+    /// [`ProbeError`]; [`ProbeError::Obstacle`] if the force exceeds `trigger` (N): the arm has
+    /// stopped, and come free of the obstacle.
     ///
-    /// - `speed`: m/s, at most; near the part not above `TouchParams::safe_speed`.
+    /// - `speed`: maximum, m/s; near the part not above `TouchParams::safe_speed`.
     pub fn line(
         &mut self,
         doing: &'static str,
@@ -491,15 +488,15 @@ impl<'a> Watched<'a> {
         }
     }
 
-    /// As [`Self::line`], from where the tip may be in contact, also with more than the limit: once
-    /// it is free, what it meets is an obstacle, and before that whatever presses more than at the
+    /// As [`Self::line`], from a pose that may be in contact, also above the force limit: after the
+    /// tip is free, any contact is an obstacle; before that, any larger force than at the
     /// beginning.
     ///
-    /// A surface beside the way, as the wall of a hole that it goes up in, is none: the tip goes
-    /// off it and on beside the way, and ends as far beside `to`.
+    /// A surface beside the path, such as the wall of a hole, is none: the tip goes off it and on
+    /// beside the path, and ends beside `to` by the same offset.
     ///
     /// # Errors
-    /// As there.
+    /// As [`Self::line`].
     pub fn leave(
         &mut self,
         doing: &'static str,
@@ -530,9 +527,9 @@ impl<'a> Watched<'a> {
         }
     }
 
-    /// What it met before it arrived; it has come free of it.
+    /// Goes to a pose; returns an obstacle met before the end, after coming free of it.
     ///
-    /// - `trigger`: above which a force is an obstacle, N, where that much is felt now.
+    /// - `trigger`: smallest force of an obstacle, N, at the present force.
     fn go(
         &mut self,
         doing: &'static str,
@@ -591,19 +588,19 @@ impl<'a> Watched<'a> {
         }))
     }
 
-    /// Stops, waits until the arm is at rest, and zeroes the sensor; returns the noise of its force,
-    /// root mean square along the axis of the base where it is largest, N.
+    /// Stops, waits for rest, and zeroes the sensor; returns the noise of its force, root mean
+    /// square along the axis of the base with the most noise, N.
     ///
     /// # Errors
-    /// [`ProbeError`]; [`ProbeError::Loaded`] and [`ProbeError::Unsteady`] where it feels
-    /// something.
+    /// [`ProbeError`]; [`ProbeError::Loaded`] and [`ProbeError::Unsteady`] for a force on the
+    /// sensor.
     pub fn zero(&mut self) -> Result<f64, ProbeError> {
         self.zero_below(self.limits.tare)
     }
 
-    /// As [`Self::zero`], of a sensor that may feel a weight.
+    /// As [`Self::zero`], for a sensor that may carry a weight.
     ///
-    /// - `most_n`: N
+    /// - `most_n`: largest force for zeroing, N
     pub(crate) fn zero_below(&mut self, most_n: f64) -> Result<f64, ProbeError> {
         let doing = "zeroing the sensor in free air";
         let forces = self.forces_at_rest(doing)?;
@@ -626,14 +623,14 @@ impl<'a> Watched<'a> {
                 most_n,
             });
         }
-        // of two means of n/2 with that spread in all three directions
+        // difference of two means of n/2, with that spread in all three directions
         if change_n > DRIFT + CHANGED * (spread * 4.0 / forces.len().max(1) as f64).sqrt() {
             return Err(ProbeError::Unsteady { doing, change_n });
         }
         self.arm
             .zero_sensor()
             .map_err(|error| ProbeError::Arm { doing, error })?;
-        // that took its time
+        // zeroing took its time
         self.last = None;
         self.liveness = Liveness::default();
         self.motion.forget();
@@ -649,9 +646,9 @@ impl<'a> Watched<'a> {
         Ok(forces)
     }
 
-    /// Refuses a sensor whose zero has gone in free air by more than the trigger.
+    /// Refuses a sensor whose zero in free air has drifted by more than the trigger.
     ///
-    /// - `zeroed_ns`: when it was zeroed.
+    /// - `zeroed_ns`: stamp of the zeroing.
     ///
     /// # Errors
     /// [`ProbeError::Drifts`]
@@ -676,7 +673,7 @@ impl<'a> Watched<'a> {
         })
     }
 
-    /// Stops, waits until the arm is at rest, and passes on the states of some time (s) after that.
+    /// Stops, waits for rest, and passes on the states of a duration (s) after that.
     ///
     /// # Errors
     /// [`ProbeError`]
@@ -698,7 +695,7 @@ impl<'a> Watched<'a> {
         })
     }
 
-    /// Stops, and waits until the arm is at rest.
+    /// Stops, and waits for rest.
     pub(super) fn halt(
         &mut self,
         doing: &'static str,
@@ -730,7 +727,7 @@ impl<'a> Watched<'a> {
         })
     }
 
-    /// Goes on and on until `until` says so; returns whether it did before the travel was over.
+    /// Goes on until `until` holds or the travel is over; returns whether `until` held.
     pub(super) fn search(
         &mut self,
         doing: &'static str,
@@ -776,15 +773,15 @@ impl<'a> Watched<'a> {
     }
 }
 
-/// What was met on a way through free air.
+/// An obstacle in free air.
 struct Met {
-    /// of the tip when it was felt, m in B
+    /// position of the tip at the contact, m in B
     place: Vector3<f64>,
-    /// until the arm stood, N
+    /// largest force until the arm stood, N
     force_n: f64,
-    /// whether that was in a fast move
+    /// whether the move was fast
     is_link: bool,
-    /// so far beside the way it may go on, m in B
+    /// offset beside the path for going on, m in B
     aside: Option<Vector3<f64>>,
 }
 
@@ -805,7 +802,7 @@ impl Met {
     }
 }
 
-/// Where a command takes the tip from a place, unit vector in B; `None`: nowhere.
+/// Direction of a command from a place, unit vector in B; `None` without motion.
 fn way_of(command: &Command, from: &Vector3<f64>) -> Option<Vector3<f64>> {
     match command {
         Command::Line { to, .. } => to.translation.vector - from,

@@ -1,4 +1,4 @@
-//! The pose of the part relative to the arm, and the tool of the arm.
+//! Pose of the part relative to the arm, and the tool of the arm.
 
 use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
 
@@ -10,20 +10,20 @@ use crate::probing::arm::ArmGeometry;
 /// A robot cell.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cell {
-    /// of the arm
+    /// geometry of the arm
     pub geometry: ArmGeometry,
-    /// of the part in the base: maps O to B
+    /// pose of the part in the base: maps O to B
     pub pose_bo: Isometry3<f64>,
-    /// of the tip in the flange: maps T to the flange; z of T from the tip to the handle
+    /// pose of the tip in the flange: maps T to the flange; z of T from the tip to the handle
     pub pose_ft: Isometry3<f64>,
-    /// what must keep clear of the mesh
+    /// tool to keep clear of the mesh
     pub tool: Tool,
 }
 
-/// A shaft that leans by less than this from the surface's normal stays as it is, rad.
+/// Lean of a shaft from the surface's normal below which it stays as it is, rad.
 const LEANS: f64 = 0.26;
 
-/// So far, m.
+/// Height of a simulated tip above the part at its start, m.
 const ABOVE: f64 = 40e-3;
 
 impl Cell {
@@ -32,7 +32,7 @@ impl Cell {
         Isometry3::from_parts((self.pose_bo * centre).coords.into(), *rotation)
     }
 
-    /// Place of O of a pose of the tip in B.
+    /// Place in O of a pose of the tip in B.
     pub fn place(&self, pose_bt: &Isometry3<f64>) -> Point3<f64> {
         self.pose_bo
             .inverse_transform_point(&Point3::from(pose_bt.translation.vector))
@@ -43,8 +43,8 @@ impl Cell {
         Unit::new_normalize(self.pose_bo.rotation.inverse() * (rotation * Vector3::z()))
     }
 
-    /// Orientation of the tip in B that aligns the shaft with the normal of a surface: as it is now
-    /// where that is near enough.
+    /// Orientation of the tip in B that aligns the shaft with the normal of a surface; the present
+    /// one if that is near enough.
     pub fn upright(
         &self,
         now: &UnitQuaternion<f64>,
@@ -63,8 +63,8 @@ impl Cell {
         turn * now
     }
 
-    /// The tip well above the middle of a part, the shaft along z of O, in B: where a simulated arm
-    /// begins.
+    /// Start of a simulated arm: the tip well above the middle of a part, the shaft along z of O,
+    /// in B.
     pub fn above(&self, part: &TriMesh) -> Isometry3<f64> {
         let [low, high] = part.bounds();
         let middle = Point3::new(

@@ -1,27 +1,27 @@
-//! Orientations of a probe that leans to all sides of where it was at first.
+//! Orientations of a probe that leans to all sides of its first one.
 
 use nalgebra::{Unit, UnitQuaternion, Vector3};
 
-/// How far the shaft leans from where it was at first, rad, and towards where about it.
+/// Lean of the shaft from its first direction, and azimuth of the lean, rad.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Orientation {
     /// from 0 to 60°
     pub lean: f64,
-    /// from x towards y of the tip at first
+    /// from x towards y of the first tip
     pub towards: f64,
 }
 
-/// An orientation that the arm does not get to.
+/// An orientation out of the arm's reach.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{:.0}° towards {:.0}°: {why}", orientation.lean.to_degrees(), orientation.towards.to_degrees())]
 pub struct NotReached {
-    /// which
+    /// the orientation
     pub orientation: Orientation,
-    /// in words
+    /// reason in words
     pub why: String,
 }
 
-/// Orientations of some leans (°), each with so many around it.
+/// Orientations of given leans (°), each with a number of sides.
 pub(super) fn rings<const N: usize>(rings: [(f64, usize); N]) -> impl Iterator<Item = Orientation> {
     rings.into_iter().flat_map(|(lean_deg, count)| {
         let towards = move |at: usize| std::f64::consts::TAU * at as f64 / count as f64;
@@ -32,7 +32,7 @@ pub(super) fn rings<const N: usize>(rings: [(f64, usize); N]) -> impl Iterator<I
     })
 }
 
-/// The shaft leans to one side, without turning about itself.
+/// Leans the shaft to one side, without turning it about itself.
 pub(super) fn leaned(
     rotation: &UnitQuaternion<f64>,
     orientation: &Orientation,

@@ -1,4 +1,4 @@
-//! Dry run: the touches and paths that the current mesh leads to, checked, without moving the arm.
+//! Dry run: touches and paths by the current mesh, checked, without motion of the arm.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
@@ -12,47 +12,47 @@ use crate::probing::arm::{ArmState, LimitError, Safety};
 use crate::probing::plan::{ExploreError, PatternParams, Slide, TouchPlan, TouchResult};
 use crate::stylus::Wrench;
 
-/// A planned motion, with its number from 0 on among those of its kind.
+/// A planned motion, with its number from 0 on within its kind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PlannedMotion {
-    /// of [`Plan::touches`]
+    /// number in [`Plan::touches`]
     #[error("touch {0}")]
     Touch(usize),
-    /// of [`Plan::slides`]
+    /// number in [`Plan::slides`]
     #[error("slide {0}")]
     Slide(usize),
 }
 
-/// A planned touch or slide that cannot be made.
+/// A planned touch or slide that is impossible.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{what}: {why}")]
 pub struct HeldBack {
-    /// which
+    /// the motion
     pub what: PlannedMotion,
-    /// in words
+    /// reason in words
     pub why: String,
 }
 
 /// The plan for a flag.
 #[derive(Clone, Debug, Default)]
 pub struct Plan {
-    /// the places that the ball's centre goes through, in O, m
+    /// path of the ball's centre, in O, m
     pub path: Vec<Point3<f64>>,
     /// moves through free air, from and to, in O, m
     pub links: Vec<[Point3<f64>; 2]>,
-    /// the touches, as they would come if the part were as the mesh has it
+    /// touches, for a part that equals the mesh
     pub touches: Vec<TouchPlan>,
-    /// the slides after them
+    /// slides after the touches
     pub slides: Vec<Slide>,
-    /// places of the surface, m in O, that are not touched, for the scan has no part there
+    /// places of the surface, m in O, without touches, for the scan has no part there
     pub left_out: Vec<Point3<f64>>,
-    /// what cannot be done
+    /// impossible touches and slides
     pub held_back: Vec<HeldBack>,
 }
 
 impl Cell {
-    /// The arm at rest with its tip at a pose in B and nothing on it, in the configuration that
-    /// leaves it most room to move; for a plan without an arm. `None` where it does not reach.
+    /// The arm at rest without load, with its tip at a pose in B and the joints of largest
+    /// dexterity; for a plan without an arm. `None` out of reach.
     pub fn at_rest(&self, pose_bt: &Isometry3<f64>) -> Option<ArmState> {
         let joints = self
             .geometry
@@ -75,10 +75,10 @@ impl Cell {
 
 /// Plans the probing of a flag.
 ///
-/// - `now`: of the arm; `way_out`: of the feature that it was stopped in.
+/// - `now`: state of the arm; `way_out`: of the feature in which it stopped.
 ///
 /// # Errors
-/// [`ExploreError`] where there is no pattern for it.
+/// [`ExploreError`] without a pattern for the flag.
 #[expect(clippy::too_many_lines)]
 pub fn plan(
     cell: &Cell,
@@ -168,8 +168,7 @@ pub fn plan(
     Ok(plan)
 }
 
-/// First contact of a ball with the mesh, by sphere tracing: each step is the distance that is
-/// left.
+/// First contact of a ball with the mesh, by sphere tracing: each step is the remaining distance.
 fn contact_on_mesh(planned: &TouchPlan, pattern: &PatternParams, world: &dyn World) -> TouchResult {
     let (
         PatternParams {
@@ -191,5 +190,5 @@ fn contact_on_mesh(planned: &TouchPlan, pattern: &PatternParams, world: &dyn Wor
     TouchResult::Nothing
 }
 
-/// Nearer than this is a touch, m.
+/// Distance of a contact, m.
 const TOUCHES: f64 = 5e-6;

@@ -1,4 +1,4 @@
-//! How the probing of a feature ended, and all that was measured.
+//! Ending of the probing of a feature, and all its measurements.
 
 use std::error::Error;
 
@@ -8,16 +8,16 @@ use super::links::LinkError;
 use crate::probing::arm::{LimitError, ProbeError, SlideRecord, StopRequest, TouchRecord};
 use crate::probing::plan::{DecidedCharacteristic, ExploreError, Found, Slide, TouchPlan};
 
-/// How it ended; as an error, why it ended before all was done.
+/// How a probing ended; as an error, why it ended early.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Ending {
     /// The number has the requested uncertainty.
     #[error("tolerance reached")]
     ToleranceReached,
-    /// The touches are spent; it is as good as they made it.
+    /// The touches are spent; the number is as good as they made it.
     #[error("tolerance not reached: the touches are spent")]
     TouchesSpent,
-    /// More touches would not help.
+    /// The calibration limits the number: more touches would not help.
     #[error(
         "tolerance not reached: what radius of the ball, place of the part and kinematics leave uncertain is in all touches alike, and \
          with it the number is {over:.1} times as uncertain as asked for: calibrate them, or ask for less"
@@ -29,30 +29,30 @@ pub enum Ending {
     /// Each characteristic passes or fails.
     #[error("decided")]
     Decided,
-    /// The touches are spent before that.
+    /// The touches are spent before each characteristic passes or fails.
     #[error(
         "undecided: the touches are spent, and {names} may still pass or fail: allow more touches, or agree on other limits"
     )]
     Undecided {
-        /// of what is open
+        /// open characteristics
         names: String,
     },
-    /// More touches would not help.
+    /// The calibration leaves characteristics open: more touches would not help.
     #[error(
         "undecided: what radius of the ball, place of the part and kinematics leave uncertain is in all touches alike, and leaves {names} \
          open however often it is touched: calibrate them, or agree on other limits"
     )]
     Undecidable {
-        /// of what is open
+        /// open characteristics
         names: String,
     },
     /// The time is spent.
     #[error("tolerance not reached: the time is spent")]
     TimeSpent,
-    /// There is no such feature where it was searched.
+    /// No such feature in the searched place.
     #[error("nothing found: {0}")]
     NothingFound(#[from] ExploreError),
-    /// A request stopped it.
+    /// A stop on request.
     #[error("cancelled: {0}")]
     Cancelled(StopRequest),
     /// The arm did not move: it would leave its limits.
@@ -76,7 +76,7 @@ impl From<ProbeError> for Ending {
 }
 
 impl Ending {
-    /// Where a decision was the goal.
+    /// Ending of a decision goal.
     pub(super) fn of_decisions(characteristics: &[DecidedCharacteristic]) -> Self {
         let names = |is_it: fn(&DecidedCharacteristic) -> bool| {
             let named = characteristics
@@ -96,7 +96,7 @@ impl Ending {
         }
     }
 
-    /// Whether tip, part or arm are not where they were: which of the touches hold is not known.
+    /// Whether tip, part or arm have moved: then it is unknown which touches hold.
     pub fn is_displaced(&self) -> bool {
         matches!(self, Self::Stopped(ProbeError::Displaced { .. }))
     }
@@ -107,7 +107,7 @@ impl Ending {
             .map_or_else(|| self.to_string(), ToString::to_string)
     }
 
-    /// Whether only this touch or slide cannot be made.
+    /// Whether only this touch or slide is impossible.
     pub(super) fn is_of_one(&self) -> bool {
         use Ending::{NoClearPath, OutOfLimits, Stopped};
         matches!(
@@ -120,62 +120,62 @@ impl Ending {
 /// One touch of a probing.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ProbedTouch {
-    /// as planned, in O
+    /// plan, in O
     pub planned: TouchPlan,
-    /// as measured; `None` when the arm was held back before
+    /// measurement; `None` if the arm was held back before
     pub record: Option<TouchRecord>,
     /// centre of the ball at contact, m in O
     pub centre: Option<Point3<f64>>,
-    /// of the contact from the mesh as it was before, m, positive outside
+    /// distance of the contact from the earlier mesh, m, positive outside
     pub deviation: Option<f64>,
-    /// why it does not count; `None`: it does
+    /// why it does not count; `None`: it counts
     pub refused: Option<String>,
 }
 
 /// One slide of a probing.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ProbedSlide {
-    /// as planned, in O
+    /// plan, in O
     pub slide: Slide,
-    /// as measured; `None` when the arm was held back before
+    /// measurement; `None` if the arm was held back before
     pub record: Option<SlideRecord>,
-    /// why it was not made; `None`: it was
+    /// why it is missing; `None`: it is not
     pub refused: Option<String>,
 }
 
-/// A reference that the arm touched again.
+/// A repeated touch of a reference.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ReferenceTouch {
-    /// number of the feature that it belongs to
+    /// number of its feature
     pub flag: u32,
-    /// which touch of that feature, from 0 on
+    /// number of the touch in that feature, from 0 on
     pub index: usize,
-    /// how much farther along its search it is than it was, m
+    /// shift of the contact along its search, m
     pub off: f64,
-    /// standard uncertainty of that, m
+    /// standard uncertainty of the shift, m
     pub sigma: f64,
 }
 
 /// The result of a flag.
 #[derive(Clone, Debug)]
 pub struct Probed {
-    /// its number
+    /// number of the flag
     pub flag: u32,
-    /// how it ended
+    /// its ending
     pub ending: Ending,
-    /// what was found, also where it ended early
+    /// the feature, also after an early ending
     pub found: Option<Found>,
-    /// all touches, in their order
+    /// all touches, in order
     pub touches: Vec<ProbedTouch>,
-    /// and the slides after them
+    /// slides after the touches
     pub slides: Vec<ProbedSlide>,
-    /// the contacts that were touched again last, none of which had moved
+    /// last touches of the references, none of them moved
     pub references: Vec<ReferenceTouch>,
-    /// so many of the touches were made before that
+    /// number of touches made before these
     pub verified: usize,
-    /// places of the surface, m in O, that were not touched, for the scan has no part there
+    /// places of the surface, m in O, without touches, for the scan has no part there
     pub left_out: Vec<Point3<f64>>,
-    /// by the arm's clock, s
+    /// duration by the arm's clock, s
     pub seconds: f64,
     /// largest force on the tip, N
     pub peak_force: f64,

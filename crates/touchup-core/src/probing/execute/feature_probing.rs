@@ -13,50 +13,50 @@ use crate::probing::arm::{
 };
 use crate::probing::plan::{Explorer, TouchPlan, TouchResult};
 
-/// A feature that is being probed: the position of the ball, its path back into free air, and its
+/// A feature during its probing: the position of the ball, its path back into free air, and its
 /// touches.
 pub(super) struct FeatureProbing<'p, 'a> {
     pub prober: &'p mut Prober<'a>,
     pub flag: u32,
-    /// that it is touched with, of the tip in B
+    /// orientation of the tip in B for the touches
     pub rotation: UnitQuaternion<f64>,
-    /// where the tool was last in free air
+    /// last state of the tool in free air
     pub out: ToolState,
-    /// whether it is there now
+    /// whether the tool is there now
     pub is_out: bool,
-    /// below that, where the touch is entered from, m in O; `None` where it is the same, or the
-    /// ball was not there yet
+    /// entry of the touch, below free air, m in O; `None` if it is the same place, or the ball was
+    /// not there yet
     pub entry: Option<Point3<f64>>,
-    /// where the last search began, m in O; `None` where the ball was not there yet
+    /// start of the last search, m in O; `None` if the ball was not there yet
     pub from: Option<Point3<f64>>,
-    /// whether the sensor is zeroed where it is touched
+    /// whether the zero of the sensor is from this feature
     pub is_zeroed: bool,
-    /// when it was, by the arm's clock, ns
+    /// stamp of the zero by the arm's clock, ns
     pub zeroed_ns: i64,
     pub begun_ns: i64,
     pub ended_ns: i64,
     pub touches: Vec<ProbedTouch>,
     pub slides: Vec<ProbedSlide>,
-    /// as they were touched again last
+    /// last touches of the references
     pub references: Vec<ReferenceTouch>,
-    /// touches that were made until then
+    /// touches made until then
     pub verified: usize,
     pub peak_force: f64,
 }
 
-/// A search that ends this much before its planned length has not searched the remainder, m.
+/// Length, m, by which a search may end early and still count as complete.
 const SHORT: f64 = 0.1e-3;
-/// Touches that begin nearer than this to each other, over the ball's radius, are gone between
-/// inside of the feature.
+/// Maximum distance of two starts of touches, over the ball's radius, for a move inside the
+/// feature.
 const INSIDE: f64 = 0.5;
-/// An arm comes to a place with a new error only from farther than this, m. Touches between which
-/// the ball stays nearer would share one error, and the fit takes the errors of touches for
+/// Minimum travel after which an arm comes to a place with a new error, m. Touches without such
+/// travel between them would share one error, and the fit takes the errors of touches for
 /// independent.
 const ANEW: f64 = 1e-3;
 
 impl<'a> Prober<'a> {
-    /// Probes one flagged feature. Whatever happens, the arm is stopped when this returns; it has
-    /// retracted wherever it was still allowed to move.
+    /// Probes one flagged feature. In any case the arm has stopped at the return, and has retracted
+    /// unless it may no longer move.
     pub fn probe(&mut self, flag: &Flag) -> Probed {
         let (mut explorer, mut probing) = match self.begin(flag) {
             Ok(begun) => begun,
@@ -81,7 +81,7 @@ impl<'a> Prober<'a> {
         if probing.prober.params.slides && ended.is_ok() {
             ended = probing.slide_over(explorer.slides());
         }
-        // a limit of time holds for these as well
+        // a time limit holds for these as well
         if ended.is_ok() {
             ended = probing
                 .check_zero()
@@ -106,7 +106,7 @@ impl<'a> Prober<'a> {
         };
         Probed {
             flag: flag.id,
-            // which of its touches hold is not known
+            // it is unknown which of its touches hold
             found: found.ok().filter(|_| !ending.is_displaced()),
             ending,
             seconds: probing.seconds(),
@@ -119,7 +119,7 @@ impl<'a> Prober<'a> {
         }
     }
 
-    /// The explorer and where the arm is, when both can begin.
+    /// The explorer and the probing, if both can begin.
     pub(super) fn begin(
         &mut self,
         flag: &Flag,
@@ -131,7 +131,7 @@ impl<'a> Prober<'a> {
         Ok((explorer, probing))
     }
 
-    /// Out of the feature that another probing was stopped in, where the arm still stands there.
+    /// Leaves the feature in which another probing stopped, if the arm still stands there.
     fn leave(&mut self, flag: &Flag) -> Result<(), Ending> {
         let Some(way_out) = self.way_out.take() else {
             return Ok(());
@@ -161,10 +161,10 @@ impl<'a> Prober<'a> {
 }
 
 impl<'p, 'a> FeatureProbing<'p, 'a> {
-    /// Nothing is touched yet.
+    /// A probing without touches.
     ///
-    /// - `flag`: its number; `rotation`: that it is touched with, of the tip in B; `state`: of the
-    ///   arm, in free air.
+    /// - `flag`: its number; `rotation`: of the tip in B for the touches; `state`: of the arm, in
+    ///   free air.
     pub fn new(
         prober: &'p mut Prober<'a>,
         flag: u32,
@@ -193,8 +193,8 @@ impl<'p, 'a> FeatureProbing<'p, 'a> {
 }
 
 impl FeatureProbing<'_, '_> {
-    /// Keeps what was seen while the arm moved, also where that was broken off: the largest force,
-    /// N, and when it was seen last, ns.
+    /// Records data of a motion, also if it ended early: the largest force, N, and the stamp of the
+    /// last state, ns.
     pub fn keep(&mut self, (peak_force, seen_ns): (f64, Option<i64>)) {
         self.peak_force = self.peak_force.max(peak_force);
         self.ended_ns = seen_ns.unwrap_or(self.ended_ns).max(self.ended_ns);
@@ -209,7 +209,7 @@ impl FeatureProbing<'_, '_> {
         self.seconds() > self.prober.params.limits.time
     }
 
-    /// Retracts, wherever the arm is allowed to move.
+    /// Retracts if the arm may move.
     pub fn finish<T>(&mut self, ended: Result<T, Ending>) -> Result<T, Ending> {
         use Ending::{Cancelled, NoClearPath, OutOfLimits, Stopped, TimeSpent};
         // a failed retraction outranks these
@@ -225,7 +225,7 @@ impl FeatureProbing<'_, '_> {
                     | Stopped(ProbeError::TooLong { .. } | ProbeError::Displaced { .. }))
             );
         let retracted = if may_move { self.retract() } else { Ok(()) };
-        // where nothing comes any more it ended when it was seen last
+        // without a new state it ended with the last one
         let last = self.prober.arm.next_state();
         self.prober.way_out = last.as_ref().ok().and_then(|state| self.way_out(state));
         self.ended_ns = last.map_or(self.ended_ns, |state| state.stamp_ns.max(self.ended_ns));
@@ -238,7 +238,7 @@ impl FeatureProbing<'_, '_> {
 
     /// One touch by itself: there, and back into free air.
     pub fn touch_and_retract(&mut self, planned: &TouchPlan) -> Result<ProbedTouch, Ending> {
-        // zeroed again for each, as another touch has nothing to do with it
+        // zeroed again for each, as the touches are independent
         self.is_zeroed = false;
         let (_, touched) = self.go_and_touch(planned)?;
         self.prober.world.touched(self.flag, &touched);
@@ -255,7 +255,7 @@ impl FeatureProbing<'_, '_> {
             let mut has_collided = false;
             let (result, touch) = match self.go_and_touch(&planned) {
                 Ok(touched) => touched,
-                // the first one is where the feature is
+                // the first touch is at the place of the feature
                 Err(ending @ (Ending::OutOfLimits(_) | Ending::NoClearPath(_)))
                     if self.touches.is_empty() =>
                 {
@@ -296,7 +296,7 @@ impl FeatureProbing<'_, '_> {
         });
     }
 
-    /// A link move, or one that is guarded, to a pose of the tip in B.
+    /// A link move, or a guarded one, to a pose of the tip in B.
     fn line(
         &mut self,
         doing: &'static str,
@@ -326,7 +326,7 @@ impl FeatureProbing<'_, '_> {
         };
         let seen = watched.seen();
         self.keep(seen);
-        // however slow a link is, nothing should be there
+        // nothing should be on a link of any speed
         moved.map_err(|error| match (error, guard) {
             (
                 ProbeError::Obstacle {
@@ -347,13 +347,13 @@ impl FeatureProbing<'_, '_> {
         })
     }
 
-    /// Goes out, and looks whether the sensor still reads nothing in free air.
+    /// Goes out, and checks that the sensor still reads nothing in free air.
     fn check_zero(&mut self) -> Result<(), Ending> {
         self.go_out("going up out of the feature", LineGuard::Out)?;
         if self.is_zeroed {
             let (zeroed_ns, touch) = (self.zeroed_ns, &self.prober.params.touch);
             self.prober.watched().check_zero(zeroed_ns, touch)?;
-            // what it did drift by is no contact
+            // its drift is no contact
             self.is_zeroed = false;
         }
         Ok(())
@@ -367,7 +367,7 @@ impl FeatureProbing<'_, '_> {
         Ok(self.prober.arm.next_state().map_err(arm)?.stamp_ns)
     }
 
-    /// Brings the ball to where a touch is entered from, and touches.
+    /// Brings the ball to the entry of a touch, and touches.
     pub fn go_and_touch(
         &mut self,
         planned: &TouchPlan,
@@ -380,14 +380,14 @@ impl FeatureProbing<'_, '_> {
             .from
             .is_some_and(|from| (from - planned.from).norm() < near);
         let is_away = self.touches.last().is_none_or(ends_away);
-        // else it stays inside of the feature
+        // otherwise it stays inside the feature
         if !is_near || !is_away || planned.from == planned.entry {
             self.reach(&planned.entry)?;
         }
         self.touch(planned)
     }
 
-    /// Out of the feature, and through free air to a place above it.
+    /// Goes out of the feature, and through free air to a place above it.
     pub fn reach(&mut self, above: &Point3<f64>) -> Result<(), Ending> {
         self.prober.world.enter(Phase::Link);
         self.go_out("going up out of the feature", LineGuard::Out)?;
@@ -402,7 +402,7 @@ impl FeatureProbing<'_, '_> {
         }
         self.out.joints = route.joints;
         if !self.is_zeroed {
-            // again where it is touched: turning the wrist loads its sensor
+            // again at the feature: turning the wrist loads its sensor
             self.prober.world.enter(Phase::Zeroing);
             self.prober.watched().zero()?;
             self.is_zeroed = true;
@@ -432,7 +432,7 @@ impl FeatureProbing<'_, '_> {
         let touched = watched.touch(&target, &params.touch);
         let (seen, reached) = (watched.seen(), watched.reached);
         self.keep(seen);
-        // where the ball has not been it does not go on the retraction
+        // the retraction only visits places that the ball has reached
         if reached.is_some() {
             self.from = Some(planned.from);
         }
@@ -443,7 +443,7 @@ impl FeatureProbing<'_, '_> {
         Ok((result, ProbedTouch { deviation, ..touch }))
     }
 
-    /// The result for the explorer, and the record of the touch.
+    /// Result for the explorer, and record of the touch.
     fn probed_touch(&self, planned: TouchPlan, record: TouchRecord) -> (TouchResult, ProbedTouch) {
         let (result, refused) = match &record.outcome {
             TouchOutcome::Contact { onset, .. } if onset.verdict == OnsetVerdict::Impact => (
@@ -487,13 +487,13 @@ impl FeatureProbing<'_, '_> {
         )
     }
 
-    /// Out of the feature into free air.
+    /// Goes out of the feature into free air.
     fn retract(&mut self) -> Result<(), Ending> {
         self.prober.world.enter(Phase::Retract);
         self.go_out("retracting", LineGuard::Retract)
     }
 
-    /// What remains of it; `None` in free air.
+    /// Remaining path out; `None` in free air.
     fn way_out(&self, now: &ArmState) -> Option<WayOut> {
         let Self {
             from, entry, out, ..
@@ -506,8 +506,8 @@ impl FeatureProbing<'_, '_> {
         })
     }
 
-    /// Back through the places where the ball has been before, none of them twice, whatever breaks
-    /// off the remaining path.
+    /// Goes back through the past places of the ball, none of them twice, even after an early end
+    /// of the remaining path.
     pub fn go_out(&mut self, doing: &'static str, guard: LineGuard) -> Result<(), Ending> {
         while !self.is_out {
             let place = self.from.or(self.entry).unwrap_or(self.out.place);
@@ -529,8 +529,8 @@ fn ends_away(touch: &ProbedTouch) -> bool {
     }
 }
 
-/// Distance of a ball from the mesh at each [`SAMPLED`] of the path of a touch, before the touch
-/// moves the mesh; m, positive outside, `None` where no mesh is near.
+/// Distance of a ball from the mesh at each [`SAMPLED`] on the path of a touch, before the touch
+/// moves the mesh; m, positive outside, `None` without a near mesh.
 fn distances(world: &dyn World, planned: &TouchPlan, ball_radius: f64) -> Vec<Option<f64>> {
     let count = (planned.search / SAMPLED).ceil() as usize + 1;
     let at = |sample: usize| {
@@ -542,7 +542,7 @@ fn distances(world: &dyn World, planned: &TouchPlan, ball_radius: f64) -> Vec<Op
     (0..=count).map(at).collect()
 }
 
-/// How far the surface that a ball touched was from the mesh, m, positive outside.
+/// Distance of a touched surface from the mesh, m, positive outside.
 fn deviation(distances: &[Option<f64>], planned: &TouchPlan, centre: &Point3<f64>) -> Option<f64> {
     let at = ((centre - planned.from).dot(&planned.direction) / SAMPLED).max(0.0);
     let sample = at as usize;
@@ -550,22 +550,22 @@ fn deviation(distances: &[Option<f64>], planned: &TouchPlan, centre: &Point3<f64
     Some(here + (next - here) * (at - at.floor()))
 }
 
-/// The distance from the mesh is sampled this often along the path of a touch, m: between two of
-/// them a wall with a radius of 1 mm bends by 1 µm.
+/// Distance of samples on the path of a touch, m: between two samples a wall with a radius of 1 mm
+/// bends by 1 µm.
 const SAMPLED: f64 = 0.1e-3;
 
-/// How a line is watched.
+/// Supervision of a line.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum LineGuard {
-    /// fast, where the path is clear
+    /// fast, for a clear path
     Link,
-    /// slow enough for whatever is there
+    /// slow enough for any obstacle
     Slow,
-    /// where the part may be in contact
+    /// from a possible contact with the part
     Out,
-    /// the same at the end, also of a probing that was cancelled
+    /// the same at the end, also of a cancelled probing
     Retract,
 }
 
-/// The mesh is searched this far from a contact, m.
+/// Reach of the mesh search from a contact, m.
 const DEVIATION_REACH: f64 = 20e-3;

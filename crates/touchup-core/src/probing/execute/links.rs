@@ -1,20 +1,20 @@
 //! Paths through free air that keep clear of the mesh.
 //!
-//! A path goes straight, or up, over and down at the lowest height at which all three keep clear. A
-//! straight line is clear when the ball, and the shaft above it, stay farther from the mesh than
-//! their radii and a margin: sphere tracing in steps of the distance that is left, which misses
-//! nothing, as the distance changes no faster than the place.
+//! A path goes straight, or up, over and down at the lowest height at which all three parts keep
+//! clear. A straight line is clear if the ball, and the shaft above it, stay farther from the mesh
+//! than their radii and a margin: sphere tracing in steps of the remaining distance misses nothing,
+//! as the distance changes no faster than the place.
 
 use nalgebra::{Point3, Unit, Vector3};
 
 use crate::parameters;
 
 parameters! {
-    /// What the arm holds, as far as it must keep clear: by default a probe of 3 mm on a shaft of 2
+    /// Tool of the arm, as far as it must keep clear: by default a probe of 3 mm on a shaft of 2
     /// mm.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct Tool in "robot" {
-        /// Of the ball, m.
+        /// Radius of the ball, m.
         ball_radius: f64 = 1.5e-3;
         /// Radius of the shaft behind the ball.
         ///
@@ -34,13 +34,13 @@ parameters! {
 /// Why there is no path.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum LinkError {
-    /// It would begin in the part.
+    /// A path that would begin in the part.
     #[error(
         "the probe is in or at the mesh at ({:.1} {:.1} {:.1}) mm: bring it into free air by hand, where its sensor can be zeroed",
         place_mm[0], place_mm[1], place_mm[2]
     )]
     InPart {
-        /// in O, mm
+        /// place in O, mm
         place_mm: [f64; 3],
     },
     /// No room to turn.
@@ -49,47 +49,47 @@ pub enum LinkError {
         place_mm[0], place_mm[1], place_mm[2]
     )]
     NoTurn {
-        /// in O, mm
+        /// place in O, mm
         place_mm: [f64; 3],
-        /// °
+        /// angle of the turn, °
         angle_deg: f64,
     },
-    /// Nothing is clear.
+    /// No clear path.
     #[error(
         "no path to ({:.1} {:.1} {:.1}) mm keeps {margin_mm:.1} mm clear of the mesh: turn the part, or probe it by hand",
         place_mm[0], place_mm[1], place_mm[2]
     )]
     NoPath {
-        /// in O, mm
+        /// place in O, mm
         place_mm: [f64; 3],
-        /// mm
+        /// margin, mm
         margin_mm: f64,
     },
 }
 
-/// Heights that are tried between a straight line and one above all.
+/// Heights tried between a straight line and a path above all.
 const HEIGHTS: usize = 6;
 /// Least step along a line, m.
 const LEAST_STEP: f64 = 20e-6;
-/// Least step of a turn, rad: by it the far end of a shaft of 60 mm moves by 0.06 mm.
+/// Least step of a turn, rad: it moves the far end of a shaft of 60 mm by 0.06 mm.
 const LEAST_TURN: f64 = 1e-3;
 
 /// A tool near a mesh.
 #[derive(Clone, Copy)]
 pub struct Clearance<'a> {
-    /// what must keep clear
+    /// tool that must keep clear
     pub tool: &'a Tool,
-    /// From the ball to the handle: up is along it.
+    /// Direction from the ball to the handle: up.
     pub shaft: Unit<Vector3<f64>>,
-    /// Of a place from the mesh, as far as a reach, m.
+    /// Distance of a place from the mesh, up to a reach, m.
     pub distance: &'a dyn Fn(&Point3<f64>, f64) -> f64,
 }
 
 impl Clearance<'_> {
-    /// At most as much room as there is around the tool at a place, m; negative: it is in the mesh,
-    /// or nearer than the margin, and how deep is not known.
+    /// Lower bound of the room around the tool at a place, m; negative: in the mesh, or nearer than
+    /// the margin, at an unknown depth.
     ///
-    /// - `reach`: no more room than that matters, m.
+    /// - `reach`: maximum room that matters, m.
     pub fn room(&self, centre: &Point3<f64>, reach: f64) -> f64 {
         let Tool {
             ball_radius,
@@ -102,7 +102,7 @@ impl Clearance<'_> {
             (self.distance)(p, radius + margin + reach) - radius - margin
         };
         let mut room = around(centre, ball_radius);
-        // balls of a little more than the shaft's radius hide all of it
+        // balls of a little more than the shaft's radius cover all of it
         let spacing = shaft_radius;
         let radius = shaft_radius * 1.25f64.sqrt();
         let count = (shaft_length / spacing).ceil() as usize;
@@ -112,7 +112,7 @@ impl Clearance<'_> {
                 &(centre + self.shaft.into_inner() * (at as f64 * spacing)),
                 radius,
             );
-            // those within half of the room here have the other half at the least
+            // balls within half of the room here have at least the other half
             let skipped = (here / 2.0 / spacing).max(0.0) as usize;
             room = room.min(if skipped > 0 { here / 2.0 } else { here });
             at += 1 + skipped;
@@ -130,7 +130,7 @@ impl Clearance<'_> {
         is_clear_along(length, room, |room| room.max(LEAST_STEP))
     }
 
-    /// Whether the tool keeps clear while it turns about the ball.
+    /// Whether the tool keeps clear in a turn about the ball.
     ///
     /// - `angle`: of the turn, rad; `shaft`: after a share of it.
     fn can_turn(
@@ -140,7 +140,7 @@ impl Clearance<'_> {
         shaft: &dyn Fn(f64) -> Unit<Vector3<f64>>,
     ) -> bool {
         let length = self.tool.shaft_length + self.tool.shaft_radius;
-        // nothing of it moves farther than its far end
+        // no point of the tool moves farther than its far end
         let room = |turned: f64| {
             Self {
                 shaft: shaft(turned / angle),
@@ -151,8 +151,8 @@ impl Clearance<'_> {
         is_clear_along(angle, room, |room| (room / length).max(LEAST_TURN))
     }
 
-    /// The place where the tool can turn about its ball and keeps clear: where it is, or as little
-    /// as can be out along its shaft.
+    /// Place for a clear turn of the tool about its ball: the present one, or the nearest out along
+    /// its shaft.
     ///
     /// - `angle`: of the turn, rad; `shaft`: after a share of it, from the ball to the handle.
     ///
@@ -176,7 +176,7 @@ impl Clearance<'_> {
             .ok_or(no_turn)
     }
 
-    /// The place at or above an entry that is clear: from there on down nothing is fast.
+    /// Clear place at or above an entry: from there on down the arm is slow.
     ///
     /// # Errors
     /// [`LinkError::NoPath`].
@@ -188,8 +188,8 @@ impl Clearance<'_> {
             .ok_or(self.no_path(entry))
     }
 
-    /// The places that the tool goes through from one place to another, without the first; both are
-    /// in free air.
+    /// Places on the path of the tool from one place to another, without the first; both are in
+    /// free air.
     ///
     /// - `highest`: of the mesh along the shaft, m from the origin of O.
     ///
@@ -230,18 +230,18 @@ impl Clearance<'_> {
     }
 }
 
-/// Where it cannot turn it is tried this much farther out, m …
+/// Step outward to the next place for a turn, m.
 const TURN_RAISE: f64 = 5e-3;
-/// … at so many places.
+/// Number of places tried for a turn.
 const TURN_PLACES: usize = 20;
-/// An entry that is not clear is raised by this, m …
+/// Step upward from an entry that is not clear, m.
 const RAISE: f64 = 2e-3;
-/// … so often at most.
+/// Number of places tried for an entry.
 const RAISES: usize = 30;
 
 /// Whether there is room all along a path from 0 to an end.
 ///
-/// - `step`: how far along a room leads at least.
+/// - `step`: least step that a room allows.
 fn is_clear_along(end: f64, room: impl Fn(f64) -> f64, step: impl Fn(f64) -> f64) -> bool {
     let mut at = 0.0;
     loop {
@@ -260,7 +260,7 @@ fn is_clear_along(end: f64, room: impl Fn(f64) -> f64, step: impl Fn(f64) -> f64
 mod tests {
     use super::*;
 
-    /// The part is what lies below z = 0.
+    /// The part is below z = 0.
     fn above_a_plate(place: &Point3<f64>, reach: f64) -> f64 {
         place.z.min(reach)
     }

@@ -1,10 +1,9 @@
-//! An arm probes flagged features by itself: from a flag to links through free air, touches, and a
+//! Probing of flagged features by an arm: from a flag to links through free air, touches, and a
 //! feature with its uncertainty.
 //!
 //! [`crate::probing::plan`] plans touches, [`crate::probing::arm`] makes each; here a planned touch
-//! becomes a path of the arm that is within its limits and keeps clear of the mesh as it is now,
-//! and each outcome becomes an [`Ending`] with its reason. On request the ball then slides over all
-//! of what was found.
+//! becomes a path of the arm within its limits and clear of the present mesh, and each outcome
+//! becomes an [`Ending`] with its reason. On request the ball then slides over the whole feature.
 
 mod cell;
 mod cone;

@@ -1,5 +1,5 @@
-//! The surface around a flag in which an opening lies. Where the ball was already, the mesh is
-//! open, and what is nearest to the flag is a wall or the floor of the opening.
+//! Surface around a flag with an opening in it. After a visit of the ball the mesh is open there,
+//! and its place nearest to the flag is on a wall or the floor of the opening.
 
 use std::f64::consts::TAU;
 
@@ -8,27 +8,26 @@ use nalgebra::{Isometry3, Point2, Point3, Unit, Vector3};
 use crate::mesh::TriMesh;
 use crate::numeric::{mean, scatter, turned_to};
 
-/// Rings around the flag on which the surface is looked at: an opening is searched for its wall no
-/// farther than the last, 12 mm …
+/// Rings around the flag in the search for the surface: the wall of an opening is searched no
+/// farther than the last, 12 mm.
 const RINGS: usize = 8;
-/// … and so many directions of each.
+/// Directions of each ring.
 const DIRECTIONS: usize = 24;
-/// What is higher above the flag, or deeper below it, is no surface around it, m.
+/// Maximum height above the flag, or depth below it, of the surface around it, m.
 const NEAR: f64 = 20e-3;
-/// Places within this of a plane are on it, m: a scan is off by that much beside a hole that it has
-/// closed.
+/// Maximum distance of a plane's places from it, m: a scan is off by that much beside a hole that
+/// it has closed.
 const ON_PLANE: f64 = 1e-3;
-/// A surface is there where so many places of a ring are on one plane: a hole may lie at the edge
-/// of a part.
+/// Minimum share of a ring's places on the plane of a surface: a hole may lie at the edge of a
+/// part.
 const ENOUGH: f64 = 0.6;
-/// It leans no more from the expected normal (cosine): 25°.
+/// Cosine of the maximum lean of the surface from the expected normal: 25°.
 const ALIKE: f64 = 0.9;
-/// What is lower below the surface than this is in the opening, m: half of how far above the
-/// surface a search begins by default.
+/// Depth below the surface beyond which a place is in the opening, m: half of the default height of
+/// a search's start above the surface.
 const IN_OPENING: f64 = 1.5e-3;
 
-/// Places of a ring, seen from outside along the normal, in the frame of the flag; `None` where
-/// nothing is.
+/// Places of a ring, seen from outside along the normal, in the frame of the flag; `None` if open.
 type Ring = [Option<Point3<f64>>; DIRECTIONS];
 
 /// A plane in the frame of the flag.
@@ -53,12 +52,12 @@ impl LevelPlane {
         self.off(place).abs() < ON_PLANE
     }
 
-    /// How far it is above the flag, m.
+    /// Height above the flag, m.
     fn above_flag(&self) -> f64 {
         -self.off(&Point3::origin()) / self.normal.z
     }
 
-    /// The plane that most places of a ring are on, where enough are.
+    /// Plane of most places of a ring, if they are enough.
     fn of_ring(ring: &Ring) -> Option<Self> {
         let count = |plane: &Self| {
             ring.iter()
@@ -66,7 +65,7 @@ impl LevelPlane {
                 .filter(|place| plane.has(place))
                 .count()
         };
-        // three a third of a turn apart, or, beside an edge, a quarter
+        // three places a third of a turn apart, or, beside an edge, a quarter
         let hypotheses = [DIRECTIONS / 3, DIRECTIONS / 4]
             .into_iter()
             .flat_map(|step| {
@@ -79,7 +78,7 @@ impl LevelPlane {
         (count(&best) as f64 >= ENOUGH * DIRECTIONS as f64).then_some(best)
     }
 
-    /// The plane of least squares through all places that are on it.
+    /// Least-squares plane through all places on it.
     fn refined(self, rings: &[Ring]) -> Option<Self> {
         let places = || {
             rings
@@ -102,16 +101,16 @@ impl LevelPlane {
     }
 }
 
-/// The place of the flag of an opening on the surface around it, m in O, and the outward normal of
-/// that.
+/// Place of an opening's flag on the surface around it, m in O, and the outward normal of that
+/// surface.
 ///
-/// That is what is nearest to the flag, unless it lies in the opening: lower than the surface
-/// around it by more than [`IN_OPENING`]. Of several surfaces, as the floor of a wide pocket and
-/// the face that it is in, the one nearest to the flag counts.
+/// It is the nearest place, unless that lies in the opening: lower than the surface around it by
+/// more than [`IN_OPENING`]. Of several surfaces, such as the floor of a wide pocket and the face
+/// around the pocket, the one nearest to the flag counts.
 ///
-/// - `flag`, `nearest`: m in O; `normal`: about that of the surface around the flag.
-/// - `radius`: of the innermost ring, m: an opening beside which the flag lies at most is inside of
-///   it; `step`: from ring to ring, m.
+/// - `flag`, `nearest`: m in O; `normal`: approximate normal of the surface around the flag.
+/// - `radius`: of the innermost ring, m: it encloses an opening with the flag at most beside it;
+///   `step`: from ring to ring, m.
 pub(super) fn on_surface_around(
     mesh: &TriMesh,
     flag: &Point3<f64>,
@@ -136,7 +135,7 @@ pub(super) fn on_surface_around(
     }
 }
 
-/// The places of the mesh on rings around the flag, the outermost of them along the normal at each.
+/// Places of the mesh on rings around the flag, at each the outermost along the normal.
 fn rings(mesh: &TriMesh, pose_of: &Isometry3<f64>, [radius, step]: [f64; 2]) -> Vec<Ring> {
     let to_f = pose_of.inverse();
     let radii = (0..RINGS).map(|ring| radius + step * ring as f64);
@@ -170,13 +169,13 @@ fn rings(mesh: &TriMesh, pose_of: &Isometry3<f64>, [radius, step]: [f64; 2]) -> 
     rings
 }
 
-/// Of a triangle, seen along z.
+/// Bounds of a triangle, seen along z.
 fn bounds(corners: &[Point3<f64>; 3]) -> [Point2<f64>; 2] {
     let [a, b, c] = corners.map(|corner| corner.xy().coords);
     [a.inf(&b).inf(&c).into(), a.sup(&b).sup(&c).into()]
 }
 
-/// Of a triangle that faces up, at a place in it.
+/// Height of a triangle that faces up, at a place in it.
 fn height(corners: &[Point3<f64>; 3], at: &Point2<f64>) -> Option<f64> {
     let [a, b, c] = corners.map(|corner| corner.xy() - at);
     let shares = [b.perp(&c), c.perp(&a), a.perp(&b)];
@@ -196,7 +195,7 @@ fn height(corners: &[Point3<f64>; 3], at: &Point2<f64>) -> Option<f64> {
 mod tests {
     use super::*;
 
-    /// Heights over a grid of 0.5 mm, 40 × 40 mm, m; where there is none the part is open.
+    /// Heights over a grid of 0.5 mm, 40 × 40 mm, m; `None` is open.
     fn surface(height: impl Fn(f64, f64) -> Option<f64>) -> TriMesh {
         let (side, at) = (81usize, |i: usize| i as f64 * 0.5e-3 - 20e-3);
         let places: Vec<_> = (0..side * side)
@@ -218,7 +217,7 @@ mod tests {
         .unwrap()
     }
 
-    /// By the rings of a flag with a radius of 3 mm and a ball of 1.5 mm.
+    /// Result by the rings of a flag with a radius of 3 mm and a ball of 1.5 mm.
     fn found(
         mesh: &TriMesh,
         flag: [f64; 3],
@@ -249,7 +248,7 @@ mod tests {
                 ([1.0, -1.0, -4.0], [1.0, -1.0, -5.0], 0.0),
                 ([0.0, 1.0, 2.0], [0.0, 0.0, -5.0], 0.0),
                 ([0.0, 0.0, -2.0], [0.0, 4.0, -2.0], 0.0),
-                // on the surface, or almost: as it is
+                // on the surface, or almost: unchanged
                 ([0.0, 0.0, 0.0], [0.0, 4.0, 0.0], 0.0),
                 ([0.0, 0.0, 2.0], [4.0, 0.0, 0.5], 0.5),
                 ([0.0, 0.0, -1.0], [0.0, 4.0, -1.0], -1.0),
@@ -264,7 +263,7 @@ mod tests {
         }
     }
 
-    /// z = x / 10, an angle of 5.7°, as far as y = 5 mm.
+    /// z = x / 10, an angle of 5.7°, up to y = 5 mm.
     #[test]
     fn the_normal_is_that_of_the_surface_around_it_beside_an_edge_as_well() {
         let slope = |x: f64, y: f64| match x.hypot(y) {
@@ -291,14 +290,14 @@ mod tests {
         let mesh = surface(depth);
         let level =
             |flag: f64, nearest: f64| found(&mesh, [0.0, 0.0, flag], [0.0, 0.0, nearest]).0.z * 1e3;
-        // the hole, flagged on the floor; the pocket, flagged where its face was
-        // where a ring crosses its wall the places between have a share
+        // the hole, flagged on the floor; the pocket, flagged at its former face: places at which a
+        // ring crosses its wall have a share
         assert!((level(-6.0, -11.0) + 6.0).abs() < 0.1 && level(0.0, -6.0).abs() < 0.1);
-        // by its flag on the floor it may be a hole there
+        // with its flag on the floor it may be a hole there
         assert_eq!(level(-6.0, -6.0), -6.0);
     }
 
-    /// Where there is no such surface, what is nearest is all that is known.
+    /// Without such a surface only the nearest place is known.
     #[test]
     fn a_flag_without_a_surface_around_it_stays_where_it_is() {
         let mesh = surface(|x, y| (x.hypot(y) < 2e-3).then_some(-5e-3));
@@ -306,7 +305,7 @@ mod tests {
             found(&mesh, [0.0, 0.0, 0.0], [0.0, 0.0, -5.0]).0,
             Point3::new(0.0, 0.0, -5e-3)
         );
-        // 45° from what was expected
+        // 45° from the expected normal
         let steep = surface(|x, _| Some(x));
         assert_eq!(
             found(&steep, [0.0, 0.0, 0.0], [0.0, 0.0, -12.0]).0,

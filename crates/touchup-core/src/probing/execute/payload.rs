@@ -1,10 +1,9 @@
 //! Measurements for payload identification by the arm itself: in free air it turns its probe about
-//! the ball into a cone of orientations, dwells in each, and keeps the mean wrench of the sensor
-//! there.
+//! the ball into a cone of orientations, dwells in each, and keeps the mean wrench of its sensor.
 //!
-//! The first orientation of the arm is the middle. All paths are planned before anything moves. The
-//! sensor is zeroed in each orientation, so that a weight that is not known yet is no force to stop
-//! for; what is kept is the raw wrench, which no zero changes.
+//! The first orientation of the arm is the middle. The plan of all paths comes before any motion.
+//! Zeroing the sensor in each orientation keeps an unknown weight from stopping the arm; the
+//! readings are of the raw wrench, which no zero changes.
 
 use nalgebra::UnitQuaternion;
 
@@ -17,46 +16,46 @@ use super::route::{FreeSpace, Route, ToolState};
 use crate::calibrate::{SampleBlock, StaticPose};
 use crate::stylus::Sample;
 
-/// The static segments for payload identification.
+/// Static segments for payload identification.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PayloadReadings {
-    /// in their order: of the flange in the base, the raw wrench in the axes of the flange about
-    /// its origin
+    /// segments in order: orientation of the flange in the base, raw wrench in the axes of the
+    /// flange about its origin
     pub segments: Vec<StaticPose>,
-    /// those that were left out
+    /// orientations left out
     pub not_reached: Vec<NotReached>,
 }
 
-/// Why the payload was not measured.
+/// Why there is no measurement of the payload.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PayloadProbeError {
-    /// The arm did not get so far.
+    /// An early end of the motion.
     #[error("{0}")]
     Ended(#[from] Ending),
-    /// Nothing moved.
+    /// Too few orientations; nothing moved.
     #[error(
         "the arm gets to {reached} of {wanted} orientations, {FEWEST} are needed; {why}. Nothing moved: bring the probe to where the \
          wrist has more room"
     )]
     TooFew {
-        /// how many
+        /// reachable orientations
         reached: usize,
-        /// of how many
+        /// planned orientations
         wanted: usize,
-        /// of the first that it does not get to
+        /// reason of the first unreachable one
         why: String,
     },
 }
 
-/// Leans of the shaft, °, and how many orientations around each: two neighbours are 51° apart at
-/// the most.
+/// Leans of the shaft, °, and the number of orientations around each: two neighbours are 51° apart
+/// at the most.
 const RINGS: [(f64, usize); 3] = [(0.0, 1), (30.0, 6), (60.0, 6)];
-/// Six unknowns of the force and three equations from each; these leave degrees of freedom for the
-/// residuals.
+/// Minimum number of orientations: six unknowns of the force and three equations from each; these
+/// leave degrees of freedom for the residuals.
 const FEWEST: usize = 6;
-/// A sensor and an arm that were just moved come to equilibrium in so long, s.
+/// Settling time of sensor and arm after a motion, s.
 const SETTLE: f64 = 0.3;
-/// The wrench is averaged over this time, s: 500 readings of a UR.
+/// Averaging time of the wrench, s: 500 readings of a UR.
 const AVERAGED: f64 = 1.0;
 
 impl Prober<'_> {
@@ -64,11 +63,11 @@ impl Prober<'_> {
     /// there.
     ///
     /// # Errors
-    /// [`PayloadProbeError`]; the arm is stopped then.
+    /// [`PayloadProbeError`]; the arm has then stopped.
     pub fn measure_payload(&mut self) -> Result<PayloadReadings, PayloadProbeError> {
         let (state, _) = self.in_free_air(self.params.limits.force)?;
         let home = ToolState::of(self.cell, &state);
-        // all of the probe up to the flange keeps clear
+        // the whole probe up to the flange keeps clear
         let length = self.cell.pose_ft.translation.vector.norm();
         let cell = Cell {
             tool: Tool {
@@ -118,14 +117,14 @@ impl Prober<'_> {
         let mut watched = self.watched();
         for (place, rotation) in &route.stops {
             let pose = cell.pose(rotation, place);
-            // a weight that is not known yet loads the sensor as the probe turns
+            // an unknown weight loads the sensor as the probe turns
             watched.line("turning in free air", &pose, touch.link_speed, touch, most)?;
         }
         Ok(())
     }
 
-    /// Dwells, averages the wrench, and zeroes the sensor; what was measured, and when that ended,
-    /// ns.
+    /// Dwells, averages the wrench, and zeroes the sensor; returns the segment, and the stamp of
+    /// its end, ns.
     fn dwell(&mut self) -> Result<Option<(StaticPose, i64)>, Ending> {
         let r_tf = self.cell.pose_ft.rotation.inverse();
         let mut watched = self.watched();
@@ -157,8 +156,8 @@ impl Prober<'_> {
     }
 }
 
-/// The paths from one orientation to the next, the orientations without a path, and where the last
-/// path ends.
+/// Paths from one orientation to the next, orientations without a path, and the end of the last
+/// path.
 fn routes(space: &FreeSpace, home: &ToolState) -> (Vec<Route>, Vec<NotReached>, ToolState) {
     let (mut routes, mut not_reached, mut at) = (Vec::new(), Vec::new(), *home);
     for orientation in orientations() {

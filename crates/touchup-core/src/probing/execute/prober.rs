@@ -1,4 +1,4 @@
-//! What is probed, how, and by what.
+//! Object, settings and arm of a probing.
 
 use std::collections::BTreeMap;
 
@@ -21,42 +21,41 @@ use crate::probing::plan::{DecisionGoal, ExploreError, Explorer, PatternParams};
 /// A place to probe.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Flag {
-    /// its number
+    /// number of the flag
     pub id: u32,
-    /// what it is; `None`: unknown
+    /// kind of the feature; `None`: unknown
     pub kind: Option<Kind>,
-    /// m, in O
+    /// place of the flag, m in O
     pub place: Point3<f64>,
-    /// it is no farther than this from the place, m
+    /// maximum distance of the feature from the place, m
     pub radius: f64,
 }
 
-/// How is probed.
+/// Settings of a probing.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ProbeParams {
-    /// single touches
+    /// settings of single touches
     pub touch: TouchParams,
-    /// what is wanted of a feature; the radius around a flag is the flag's
+    /// request for a feature; the radius around a flag is the flag's
     pub pattern: PatternParams,
-    /// what ends the probing of a feature, in place of an uncertainty: by the numbers of their
-    /// flags
+    /// decision goals, in place of an uncertainty, by the numbers of their flags
     pub goals: BTreeMap<u32, DecisionGoal>,
-    /// whether the ball slides over all of what its touches have found
+    /// whether the ball slides over the whole feature after its touches
     pub slides: bool,
-    /// what must never be left
+    /// limits of all motions
     pub limits: Limits,
 }
 
-/// The limit of force is so much above the force of a touch at least: the force grows a little
-/// while the arm brakes.
+/// Minimum ratio of the force limit to the force of a touch: the force grows a little while the arm
+/// brakes.
 const HEADROOM: f64 = 1.3;
 
-/// A trigger is so many times the noise at least: by chance two readings in a row are above it once
-/// in hundreds of hours.
+/// Minimum ratio of the trigger to the noise: by chance two readings in a row are above it once in
+/// hundreds of hours.
 const QUIET: f64 = 4.0;
 
 impl ProbeParams {
-    /// These with what a request asks for, which can only be less.
+    /// These settings, tightened by a request.
     ///
     /// # Errors
     /// As [`Limits::narrowed`]; [`LimitError::TooSoft`].
@@ -79,12 +78,12 @@ impl ProbeParams {
 }
 
 impl Flag {
-    /// What explores it, and the orientation of the tip in B for that.
+    /// Explorer of the flag, and the orientation of the tip in B for it.
     ///
-    /// - `now`: of the arm.
+    /// - `now`: state of the arm.
     ///
     /// # Errors
-    /// [`ExploreError`] where there is no pattern for it.
+    /// [`ExploreError`] without a pattern for the flag.
     pub(super) fn explorer(
         &self,
         cell: &Cell,
@@ -130,7 +129,7 @@ pub struct Prober<'a> {
 }
 
 impl<'a> Prober<'a> {
-    /// - `arm`: at rest in free air, or where [`Self::leaving_by`] begins.
+    /// - `arm`: at rest in free air, or at the beginning of [`Self::leaving_by`].
     pub fn new(
         arm: &'a mut dyn Arm,
         cell: &'a Cell,
@@ -147,36 +146,36 @@ impl<'a> Prober<'a> {
         }
     }
 
-    /// Has the next probing begin with the way out of the feature that another one was stopped in,
-    /// where the arm still stands there.
+    /// Lets the next probing begin with the path out of the feature in which another one stopped,
+    /// if the arm still stands there.
     #[must_use]
     pub fn leaving_by(self, way_out: Option<WayOut>) -> Self {
         Self { way_out, ..self }
     }
 
-    /// The way out of the feature that the last probing was stopped in; `None`: the arm is in free
-    /// air, or nothing is known of where it is.
+    /// Path out of the feature in which the last probing stopped; `None`: the arm is in free air,
+    /// or its place is unknown.
     pub fn into_way_out(self) -> Option<WayOut> {
         self.way_out
     }
 
-    /// Has contacts of features that were probed before touched again after the next one.
+    /// Adds contacts of earlier features that the arm touches again after the next one.
     #[must_use]
     pub fn beside(self, references: References) -> Self {
         Self { references, ..self }
     }
 
-    /// The contacts that are touched again, for the next feature.
+    /// Contacts that the arm touches again, for the next feature.
     pub fn take_references(&mut self) -> References {
         std::mem::take(&mut self.references)
     }
 
-    /// The arm, watched by all that watches it.
+    /// The arm under all supervision.
     pub(super) fn watched(&mut self) -> Watched<'_> {
         Watched::new(self.arm, self.params.limits.clone(), self.world)
     }
 
-    /// Where the arm may go.
+    /// Free space of the arm.
     pub(super) fn space(&self) -> FreeSpace<'_> {
         FreeSpace {
             cell: self.cell,
@@ -185,7 +184,7 @@ impl<'a> Prober<'a> {
         }
     }
 
-    /// Where the arm is, at rest in free air, its sensor zeroed and quiet enough to touch by.
+    /// State of the arm, at rest in free air, its sensor zeroed and quiet enough for touches.
     pub(super) fn ready_to_touch(&mut self) -> Result<ArmState, Ending> {
         let (state, noise_n) = self.in_free_air(self.params.limits.tare)?;
         let (trigger_n, least_n) = (self.params.touch.trigger, QUIET * noise_n);
@@ -200,12 +199,12 @@ impl<'a> Prober<'a> {
         Ok(state)
     }
 
-    /// Where the arm is, at rest in free air with its sensor zeroed.
+    /// State of the arm, at rest in free air with its sensor zeroed.
     ///
-    /// - `most_n`: that the sensor may feel before, N.
+    /// - `most_n`: largest force on the sensor before, N.
     /// - returns also the noise of its force, N.
     pub(super) fn in_free_air(&mut self, most_n: f64) -> Result<(ArmState, f64), Ending> {
-        // zeroing the sensor would remove a force that acts now
+        // zeroing the sensor would remove a present force
         let arm = |error| ProbeError::Arm {
             doing: "asking where the arm is",
             error,
@@ -229,7 +228,7 @@ impl<'a> Prober<'a> {
             let place_mm = (here * 1e3).coords.into();
             return Err(LinkError::InPart { place_mm }.into());
         }
-        // in free air, where it is stopped: the first link is watched by the force as well
+        // in free air, at a stop: the force guards the first link as well
         let noise_n = self.watched().zero_below(most_n)?;
         Ok((self.arm.next_state().map_err(arm)?, noise_n))
     }

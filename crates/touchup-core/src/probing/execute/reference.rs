@@ -1,10 +1,9 @@
-//! Contacts that are touched again: whether tip, part and arm are still where they were.
+//! References: contacts that the arm touches again, to check that tip, part and arm have not moved.
 //!
-//! Touches agree with each other wherever they are off together, so a bent tip, a part that slipped
-//! and an arm that drifted show in none of them alone. A contact says where the part is along its
+//! Touches with a common error agree with each other, so a bent tip, a part that slipped and an arm
+//! that drifted show in none of them alone. A contact shows the position of the part along its
 //! search; so the earliest contacts of up to three independent directions are kept, over all
-//! features that are probed one after the other, and touched again after each feature and after
-//! each collision.
+//! features in sequence, and touched again after each feature and after each collision.
 
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 
@@ -12,41 +11,41 @@ use super::ending::ProbedTouch;
 use crate::probing::arm::{OnsetVerdict, TouchOutcome};
 use crate::probing::plan::TouchPlan;
 
-/// The contacts that the arm touches again, and when the last of them was where it had been.
+/// Contacts that the arm touches again, and their last confirmation.
 #[derive(Clone, Debug, Default)]
 pub struct References {
     pub(super) kept: Vec<ReferenceContact>,
-    /// number of the feature, and its touches until then
+    /// number of the feature then, and of its touches
     pub(super) good: Option<(u32, usize)>,
 }
 
 /// A contact that the arm touches again.
 #[derive(Clone, Debug)]
 pub(super) struct ReferenceContact {
-    /// number of the feature, and of the touch in it from 0 on
+    /// number of the feature, and of its touch from 0 on
     pub flag: u32,
     pub index: usize,
-    /// in O
+    /// plan of the touch, in O
     pub planned: TouchPlan,
-    /// of the tip in B
+    /// orientation of the tip in B
     pub rotation: UnitQuaternion<f64>,
-    /// of the ball, m in O
+    /// centre of the ball, m in O
     pub centre: Point3<f64>,
-    /// of its curve, m
+    /// uncertainty of its curve, m
     pub sigma: f64,
-    /// the part of its direction that those before it do not have, unit vector in O
+    /// part of its direction that is new among the earlier ones, unit vector in O
     pub axis: Vector3<f64>,
 }
 
-/// A contact is kept if this share of its direction is none of those that are kept.
+/// Minimum share of a contact's direction that is new, for a reference.
 const INDEPENDENT: f64 = 0.5;
-/// The part pushes back along the search within 18° (cosine): on a slope the ball may slip.
+/// Cosine of 18°: the part pushes back along the search within this; on a slope the ball may slip.
 const SQUARE: f64 = 0.95;
 
 impl References {
-    /// Keeps the contacts of a feature whose direction is new.
+    /// Keeps the contacts of a feature with a new direction.
     ///
-    /// - `rotation`: that it is touched with, of the tip in B.
+    /// - `rotation`: of the tip in B for its touches.
     pub(super) fn keep(
         &mut self,
         flag: u32,
@@ -58,7 +57,7 @@ impl References {
                 continue;
             };
             let direction = touch.planned.direction.into_inner();
-            // after Gram and Schmidt, so that there are three at most
+            // after Gram and Schmidt, so that there are at most three
             let new = self
                 .kept
                 .iter()
@@ -78,7 +77,7 @@ impl References {
     }
 }
 
-/// The ball's centre at a contact that repeats, m in O, and the uncertainty of its curve, m.
+/// Centre of the ball at a repeatable contact, m in O, and the uncertainty of its curve, m.
 fn square_contact(touch: &ProbedTouch) -> Option<(Point3<f64>, f64)> {
     let record = touch.record.as_ref()?;
     let TouchOutcome::Contact { onset, force_b, .. } = &record.outcome else {

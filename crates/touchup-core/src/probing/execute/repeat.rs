@@ -1,5 +1,4 @@
-//! One spot, touched again and again from both sides: how far the arm can be trusted, and how stiff
-//! it is.
+//! Repeated touches of one spot from both sides: repeatability and stiffness of the arm.
 
 use nalgebra::{Point3, Unit, Vector3};
 
@@ -15,60 +14,59 @@ use crate::probing::plan::TouchPlan;
 /// One touch of the spot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpotTouch {
-    /// The side from which the tool came: 1 or -1.
+    /// Side from which the tool came: 1 or -1.
     pub side: i8,
-    /// Of the ball's centre at contact, along the outward normal, m from the origin of O.
+    /// Height of the ball's centre at contact, along the outward normal, m from the origin of O.
     pub height: f64,
-    /// Its standard uncertainty, m.
+    /// Standard uncertainty of the height, m.
     pub sigma: f64,
-    /// Of arm, probe and part together, and its standard uncertainty, N/m.
+    /// Stiffness of arm, probe and part together, and its standard uncertainty, N/m.
     pub stiffness: [f64; 2],
-    /// The class of the curve.
+    /// Class of the curve.
     pub verdict: OnsetVerdict,
 }
 
-/// What the touches of one spot say.
+/// Results of the touches of one spot.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Repeatability {
-    /// In their order; every second one from the other side.
+    /// Touches in order; every second one from the other side.
     pub touches: Vec<SpotTouch>,
     /// Place of the spot on the mesh, m in O.
     pub place: Point3<f64>,
-    /// Out of the part, in O.
+    /// Normal out of the part, in O.
     pub normal: Unit<Vector3<f64>>,
 }
 
 /// Why the spot gives no result.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SpotError {
-    /// The arm did not get so far.
+    /// An early end of the motion.
     #[error("{0}")]
     Ended(#[from] Ending),
-    /// One of the touches made no contact, or none that can be used.
+    /// A touch without contact, or without a usable one.
     #[error("touch {touch}: {why}")]
     NoContact {
-        /// from 1 on
+        /// number of the touch, from 1 on
         touch: usize,
-        /// in words
+        /// reason in words
         why: String,
     },
 }
 
-/// The ball begins to search this far above the spot, and searches twice as far, m.
+/// Height above the spot at which a search of twice this length begins, m.
 const STANDOFF: f64 = 2e-3;
-/// The tool comes from this far aside, and from this far above where it begins to search, m.
+/// Distance of the tool's entry aside, and above the start of the search, m.
 const ASIDE: f64 = 10e-3;
 const ABOVE: f64 = 5e-3;
 
 impl Prober<'_> {
-    /// Touches one spot, coming from one side and from the other in turn, so that play of the
-    /// joints shows.
+    /// Touches one spot, from one side and from the other in turn, so that play of the joints
+    /// shows.
     ///
     /// - `spot`: on the mesh or near it, m in O; flat for some 10 mm about.
     ///
     /// # Errors
-    /// [`SpotError`]; the arm is stopped then, and has retracted wherever it was still allowed to
-    /// move.
+    /// [`SpotError`]; the arm has then stopped, and has retracted unless it may no longer move.
     pub fn repeat(&mut self, spot: &Point3<f64>, count: usize) -> Result<Repeatability, SpotError> {
         self.at_spot(spot, |probing, place, normal| {
             let across = tangent_basis(&normal)[0];
@@ -131,7 +129,7 @@ impl Prober<'_> {
 }
 
 impl FeatureProbing<'_, '_> {
-    /// Retracts after the touches of a spot, wherever the arm is allowed to move.
+    /// Retracts after the touches of a spot, if the arm may move.
     pub fn finish_spot<T>(&mut self, touched: Result<T, SpotError>) -> Result<T, SpotError> {
         let ended = match touched {
             Err(SpotError::Ended(ending)) => Err(ending),
@@ -140,7 +138,7 @@ impl FeatureProbing<'_, '_> {
         self.finish(ended)?
     }
 
-    /// One touch of a spot, and the centre of the ball then.
+    /// One touch of a spot, and the centre of the ball.
     ///
     /// - `touch`: its number, from 1 on.
     pub fn touch_spot(
@@ -168,7 +166,7 @@ impl FeatureProbing<'_, '_> {
 }
 
 impl Repeatability {
-    /// From the lowest to the highest, m.
+    /// Range of the heights, m.
     pub fn range(&self) -> f64 {
         let heights = self.touches.iter().map(|touch| touch.height);
         let [low, high] = heights.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], h| {
@@ -177,7 +175,7 @@ impl Repeatability {
         high - low
     }
 
-    /// Mean height of those from one side, or from both, m.
+    /// Mean height of the touches from one side, or from both, m.
     fn mean(&self, side: Option<i8>) -> f64 {
         let heights = self
             .touches
@@ -195,7 +193,7 @@ impl Repeatability {
         (squares / (self.touches.len() as f64 - 1.0)).sqrt()
     }
 
-    /// How far each touch is from their mean, m.
+    /// Deviation of each touch from their mean, m.
     pub fn deviations(&self) -> Vec<f64> {
         let mean = self.mean(None);
         self.touches
@@ -204,13 +202,13 @@ impl Repeatability {
             .collect()
     }
 
-    /// How much higher the spot is when the tool comes from the first side, m.
+    /// Mean height from the first side above that from the other, m.
     pub fn reversal(&self) -> f64 {
         self.mean(Some(1)) - self.mean(Some(-1))
     }
 
-    /// Stiffness of arm, probe and part together, and its standard uncertainty, N/m: the mean of
-    /// what the curves say, and how far they scatter.
+    /// Stiffness of arm, probe and part together, and its standard uncertainty, N/m: mean and
+    /// scatter of the curves.
     pub fn stiffness(&self) -> [f64; 2] {
         let (count, all) = (self.touches.len() as f64, || {
             self.touches.iter().map(|touch| touch.stiffness[0])
@@ -225,7 +223,7 @@ impl Repeatability {
 mod tests {
     use super::*;
 
-    /// Heights in µm and stiffnesses in N/mm with sums that can be checked by hand.
+    /// Heights in µm and stiffnesses in N/mm with sums checked by hand.
     #[test]
     fn numbers_are_those_made_by_hand() {
         let touch = |(at, height, k): (usize, f64, f64)| SpotTouch {

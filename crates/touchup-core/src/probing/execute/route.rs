@@ -1,5 +1,4 @@
-//! How the tool gets from free air to where a touch is entered from; the same for what is planned
-//! and for what is done.
+//! Path of the tool from free air to the entry of a touch; the same for plan and execution.
 
 use nalgebra::{Point3, UnitQuaternion};
 
@@ -12,12 +11,12 @@ use crate::probing::arm::{
 };
 use crate::probing::plan::{Slide, TouchPlan};
 
-/// Where the tool is, in free air.
+/// State of the tool in free air.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct ToolState {
     /// centre of the ball, m in O
     pub place: Point3<f64>,
-    /// of the tip in B
+    /// orientation of the tip in B
     pub rotation: UnitQuaternion<f64>,
     pub joints: Joints,
 }
@@ -35,30 +34,30 @@ impl ToolState {
 /// A path through free air.
 #[derive(Clone, Debug)]
 pub(super) struct Route {
-    /// the places of the ball's centre that it goes through, without the first, and the orientation
-    /// that it has when it is there; m in O, of the tip in B
+    /// places of the ball's centre on the path, without the first, and the orientation at each; m
+    /// in O, of the tip in B
     pub stops: Vec<(Point3<f64>, UnitQuaternion<f64>)>,
-    /// at its end
+    /// joints at its end
     pub joints: Joints,
 }
 
-/// A turn is checked at orientations so far apart, rad.
+/// Step of orientations in the check of a turn, rad.
 const TURN_STEP: f64 = 0.1;
-/// A smaller turn is left out, rad.
+/// Smallest turn that counts, rad.
 const TURNS: f64 = 1e-6;
 
-/// A straight way is checked each so far, m: from one place to the next the distance from a
-/// singularity changes by a hundredth.
+/// Step of places in the check of a straight path, m: over one step the distance from a singularity
+/// changes by a hundredth.
 const WAY_STEP: f64 = 10e-3;
-/// From one to the next no joint turns farther, rad.
+/// Maximum turn of a joint in one step, rad.
 const JUMP: f64 = 0.6;
-/// Every so many stations of a slide the joints are checked: a millimetre or two.
+/// Step of stations in the check of joints on a slide: a millimetre or two.
 const CHECKED: usize = 10;
-/// Links of the arm keep so far from the mesh, m: what the scan may lack, and what capsules leave
-/// out.
+/// Distance of the arm's links from the mesh, m: for gaps of the scan, and volume beyond the
+/// capsules.
 const PART_GAP: f64 = 10e-3;
 
-/// Where an arm goes: a cell, within limits, around the mesh.
+/// Free space of an arm: a cell, within limits, around the mesh.
 #[derive(Clone, Copy)]
 pub(super) struct FreeSpace<'a> {
     pub cell: &'a Cell,
@@ -67,7 +66,7 @@ pub(super) struct FreeSpace<'a> {
 }
 
 impl FreeSpace<'_> {
-    /// Whether the arm may have the ball there; joints for it.
+    /// Checks a place of the ball; returns joints for it.
     ///
     /// # Errors
     /// As [`Limits::check_pose`]; [`LimitError::Part`].
@@ -83,7 +82,7 @@ impl FreeSpace<'_> {
         let pose_bt = self.cell.pose(rotation, at);
         let joints = self.limits.check_pose(geometry, pose_ft, &pose_bt, near)?;
         let bodies = ArmBodies::new(geometry, &joints, pose_ft);
-        // the probe is to be at the part: where it is clear says `Clearance`
+        // the probe belongs at the part: `Clearance` checks it
         let mut links = bodies
             .links()
             .filter(|(link, _)| !matches!(link, Link::Base | Link::Probe));
@@ -100,8 +99,8 @@ impl FreeSpace<'_> {
         }
     }
 
-    /// Whether a link is nearer to the mesh than it may be: balls along its axis, a radius apart,
-    /// that hide all of it.
+    /// Whether a link is too near the mesh: by balls along its axis, a radius apart, that cover all
+    /// of it.
     fn is_at_part(&self, capsule: &Capsule) -> bool {
         let [from, to] = capsule
             .ends
@@ -116,7 +115,7 @@ impl FreeSpace<'_> {
         !is_far && places.any(|place| self.world.closest_face(&place, reach).is_some())
     }
 
-    /// Whether the arm may be everywhere on a straight way; joints for its end.
+    /// Checks all of a straight path; returns joints for its end.
     ///
     /// - `near`: joints at its beginning.
     ///
@@ -138,7 +137,7 @@ impl FreeSpace<'_> {
         })
     }
 
-    /// One step of a way.
+    /// Checks one step of a path.
     fn step(
         &self,
         rotation: &UnitQuaternion<f64>,
@@ -157,9 +156,9 @@ impl FreeSpace<'_> {
         Ok(joints)
     }
 
-    /// Whether the arm may be everywhere on the path of a touch, from where it is entered.
+    /// Checks all of the path of a touch, from its entry on.
     ///
-    /// - `near`: joints that the arm has in free air.
+    /// - `near`: joints of the arm in free air.
     ///
     /// # Errors
     /// As [`Self::check`]; [`LimitError::Jump`].
@@ -178,9 +177,9 @@ impl FreeSpace<'_> {
             .map(|_| ())
     }
 
-    /// Whether the arm may be everywhere on a slide, from above its beginning to above its end.
+    /// Checks all of a slide, from above its beginning to above its end.
     ///
-    /// - `near`: joints that the arm has in free air.
+    /// - `near`: joints of the arm in free air.
     ///
     /// # Errors
     /// As [`Self::check`]; [`LimitError::Jump`].
@@ -202,8 +201,7 @@ impl FreeSpace<'_> {
             .map(|_| ())
     }
 
-    /// The path from where the tool is to a place at or above where a touch is entered from: first
-    /// it turns, then it goes.
+    /// Path of the tool to a place at or above the entry of a touch: first it turns, then it goes.
     ///
     /// # Errors
     /// [`Ending::OutOfLimits`], [`Ending::NoClearPath`].
@@ -266,7 +264,7 @@ mod tests {
     use crate::mesh::TriMesh;
     use crate::probing::arm::UrGeometry;
 
-    /// A UR5e whose base is the frame of the part, its probe down.
+    /// A UR5e with its base in the frame of the part, its probe down.
     fn cell() -> Cell {
         let down =
             UnitQuaternion::from_axis_angle(&nalgebra::Vector3::x_axis(), std::f64::consts::PI);
@@ -288,7 +286,7 @@ mod tests {
         }
     }
 
-    /// One square millimetre of a part, horizontal, with its middle there.
+    /// One square millimetre of a part, horizontal, with its middle at `place`.
     fn world(place: [f64; 3]) -> StaticWorld {
         let middle = Point3::from(place);
         let corners = [[-1.0, -1.0], [1.0, -1.0], [0.0, 1.0]];
@@ -331,7 +329,7 @@ mod tests {
                 | LimitError::OwnLinks { .. }
         );
         assert!(is_on_the_way, "{refused}");
-        // beside the base the same ends can be reached one after the other
+        // a path beside the base is possible
         let beside = Point3::new(-0.5, -0.4, 0.1);
         let aside = space
             .check_way(&upright, [&from, &beside], &joints)
@@ -406,7 +404,7 @@ mod tests {
         );
     }
 
-    /// Where a joint has made a turn it does not go back by it.
+    /// A joint that has made a turn does not go back by it.
     #[test]
     fn joints_stay_on_the_turn_that_they_have_made() {
         let (cell, limits, world, upright) =
@@ -434,8 +432,8 @@ mod tests {
     }
 
     proptest! {
-        /// A way that is allowed is one that joints can follow: between places 1 mm apart no joint
-        /// turns by more than a tenth of a radian.
+        /// Joints can follow any allowed path: between places 1 mm apart no joint turns by more
+        /// than a tenth of a radian.
         #[test]
         fn an_allowed_way_has_no_place_that_joints_jump_at(
             ends in proptest::array::uniform2((-0.7..0.7f64, -0.7..0.7f64, 0.0..0.4f64))

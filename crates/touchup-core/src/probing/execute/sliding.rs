@@ -1,4 +1,4 @@
-//! After the touches: the ball slides over all of what they found, for the mesh.
+//! Slides of the ball after the touches, over the whole feature, for the mesh.
 
 use nalgebra::Unit;
 
@@ -11,8 +11,8 @@ use crate::probing::arm::SlideTarget;
 use crate::probing::plan::{Slide, Station};
 
 impl FeatureProbing<'_, '_> {
-    /// Slides along each path in turn, as long as there is time. What cannot be slid over is
-    /// recorded with its reason.
+    /// Slides along each path in turn, within the time limit. An impossible slide leaves a record
+    /// with its reason.
     pub fn slide_over(&mut self, slides: Vec<Slide>) -> Result<(), Ending> {
         for slide in slides {
             let held_back = |why: String| ProbedSlide {
@@ -39,7 +39,7 @@ impl FeatureProbing<'_, '_> {
         self.prober
             .space()
             .may_slide(&self.rotation, slide, &self.out.joints)?;
-        // after the touches
+        // zeroed by the touches before
         self.is_zeroed = true;
         self.reach(&slide.above(0))?;
         let in_b = |station: &Station| Station {
@@ -67,12 +67,12 @@ impl FeatureProbing<'_, '_> {
         })
     }
 
-    /// The retraction is straight up from where the slide ended.
+    /// The retraction is straight up from the end of the slide.
     fn leave_from(&mut self, slide: &Slide, station: usize) {
         let above = slide.above(station);
         (self.from, self.entry) = (Some(slide.lifted(station)), Some(above));
         let space = self.prober.space();
-        // where nothing says that it is clear there, it goes back to where it came from
+        // without a clear place there, it goes back to its last place in free air
         let (tool, shaft) = (&space.cell.tool, space.cell.shaft(&self.rotation));
         let Ok(place) = Clearance {
             tool,

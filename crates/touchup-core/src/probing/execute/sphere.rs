@@ -1,9 +1,9 @@
-//! A sphere of known diameter, touched from its pole down to its upper half, with the probe upright
-//! and leaning.
+//! Touches of a sphere of known diameter, from its pole down within its upper half, with the probe
+//! upright and leaning.
 //!
 //! In each orientation of the shaft s the ball touches the sphere along −s at the pole that faces
 //! the shaft, and along six more normals 60° from s: behind the ball the shaft then leads away from
-//! the sphere, and with a lean of 25° no touch is below the equator, where its post may be.
+//! the sphere, and with a lean of 25° no touch is below the equator, the side of a possible post.
 
 use nalgebra::{Point3, Unit, UnitQuaternion, Vector3};
 
@@ -20,7 +20,7 @@ use crate::probing::plan::TouchPlan;
 /// The touches of a sphere in one orientation of the probe.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SphereOrientation {
-    /// of the shaft, against how it was held at first
+    /// of the shaft, against its first one
     pub orientation: Orientation,
     /// centres of the ball at contact, m in O
     pub centres: Vec<Point3<f64>>,
@@ -29,36 +29,34 @@ pub struct SphereOrientation {
 /// The touches of a sphere.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SphereTouches {
-    /// each orientation that was reached
+    /// reached orientations
     pub orientations: Vec<SphereOrientation>,
-    /// those that were left out
+    /// orientations left out
     pub not_reached: Vec<NotReached>,
 }
 
-/// Leans of the shaft, °, and how many orientations around each.
+/// Leans of the shaft, °, and the number of orientations around each.
 const RINGS: [(f64, usize); 2] = [(0.0, 1), (25.0, 4)];
-/// Touches around the pole, and how far from it.
+/// Touches around the pole, and their angle from it.
 const AROUND: usize = 6;
 const POLAR: f64 = std::f64::consts::FRAC_PI_3;
-/// Four unknowns, and one touch more.
+/// Minimum number of touches: four unknowns, and one more.
 const FEWEST: usize = 5;
-/// The ball begins to search this far from where the sphere is told to be, and searches twice as
-/// far, m.
+/// Distance from the expected sphere at which a search of twice this length begins, m.
 const STANDOFF: f64 = 3e-3;
-/// The tool comes from this far above, along the shaft, m.
+/// Height of the tool's entry above that, along the shaft, m.
 const ABOVE: f64 = 5e-3;
 
 impl Prober<'_> {
-    /// Touches a sphere in several orientations of the probe around that in which it is held; those
-    /// that it does not get to are left out. It goes back to where it began.
+    /// Touches a sphere in several orientations of the probe around its present one, without those
+    /// out of reach. Then it goes back to its start.
     ///
     /// The mesh of the world has to hold the sphere, so that no link leads through it.
     ///
-    /// - `sphere`: where it is told to be; within 2 mm.
+    /// - `sphere`: expected place; within 2 mm.
     ///
     /// # Errors
-    /// [`SpotError`]; the arm is stopped then, and has retracted wherever it was still allowed to
-    /// move.
+    /// [`SpotError`]; the arm has then stopped, and has retracted unless it may no longer move.
     pub fn touch_sphere(&mut self, sphere: &ReferenceSphere) -> Result<SphereTouches, SpotError> {
         let home = ToolState::of(self.cell, &self.ready_to_touch()?);
         let mut touched = SphereTouches {
@@ -75,14 +73,14 @@ impl Prober<'_> {
                 Err(why) => touched.not_reached.push(NotReached { orientation, why }),
             }
         }
-        // as it was held before
+        // back to the first orientation
         let here = ToolState::of(self.cell, &self.ready_to_touch()?);
         let back = self.space().route(&here, &home.rotation, &home.place)?;
         self.turn_along(&back)?;
         Ok(touched)
     }
 
-    /// All touches in one orientation, or why fewer than five of them can be made.
+    /// All touches in one orientation, or why fewer than five are possible.
     ///
     /// - `made`: number of touches of the sphere until now.
     fn touch_oriented(
@@ -96,7 +94,7 @@ impl Prober<'_> {
             self.params.pattern.ball_radius,
             &self.cell.shaft(rotation),
         );
-        // its time is that of a feature
+        // its time limit is a feature's
         let state = self.ready_to_touch()?;
         let mut probing = FeatureProbing::new(self, 0, *rotation, &state);
         let (mut centres, mut left_out) = (Vec::new(), None);
@@ -126,7 +124,7 @@ impl Prober<'_> {
     }
 }
 
-/// A pole and a ring around it.
+/// Touches at a pole and on a ring around it.
 fn touches(
     sphere: &ReferenceSphere,
     ball_radius: f64,
@@ -160,8 +158,8 @@ fn touches(
 mod tests {
     use super::*;
 
-    /// Neither the shaft behind the ball nor the way in comes nearer to the sphere than the ball,
-    /// and none of the touches is below the equator.
+    /// Neither the shaft behind the ball nor the approach comes nearer to the sphere than the ball,
+    /// and no touch is below the equator.
     #[test]
     fn the_shaft_leads_away_from_the_sphere_and_its_post_is_left_alone() {
         let (sphere, ball) = (

@@ -1,5 +1,5 @@
-//! One flat spot, touched upright around it and with the probe leaning to all sides: the poses
-//! determine the tip (TCP) in the flange.
+//! Touches of one flat spot, upright around it and leaning to all sides: their poses determine the
+//! tip (TCP) in the flange.
 
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 
@@ -10,26 +10,25 @@ use super::repeat::SpotError;
 use crate::numeric::tangent_basis;
 use crate::probing::plan::TouchPlan;
 
-/// The poses of the touches of a spot, for tip (TCP) calibration.
+/// Poses of the touches of a spot, for tip (TCP) calibration.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TipPoses {
-    /// where the spot was touched: the place that the scene has for the centre of the ball, with
-    /// the axes of the flange, in B
+    /// poses of the touches in B: the scene's centre of the ball, with the axes of the flange
     pub poses_bf: Vec<Isometry3<f64>>,
-    /// out of the spot in B, about
+    /// approximate normal out of the spot, in B
     pub normal_b: Unit<Vector3<f64>>,
-    /// orientations that were left out
+    /// orientations left out
     pub not_reached: Vec<NotReached>,
 }
 
-/// The ball begins to search this far above the spot, and searches twice as far, m: the tip may be
-/// off by less.
+/// Height above the spot at which a search of twice this length begins, m: the tip may be off by
+/// less.
 const STANDOFF: f64 = 6e-3;
-/// The tool comes from this far above where it begins to search, m.
+/// Height of the tool's entry above the start of the search, m.
 const ABOVE: f64 = 5e-3;
-/// Upright the spot is touched this far to each side: that is how the plane lies, m.
+/// Distance of upright touches to each side, which determine the plane, m.
 const ASIDE: f64 = 5e-3;
-/// Leans, °, and how many orientations around each.
+/// Leans, °, and the number of orientations around each.
 const RINGS: [(f64, usize); 2] = [(20.0, 6), (40.0, 6)];
 
 impl Prober<'_> {
@@ -38,8 +37,7 @@ impl Prober<'_> {
     /// - `spot`: on the mesh or near it, m in O; flat for some 10 mm about.
     ///
     /// # Errors
-    /// [`SpotError`]; the arm is stopped then, and has retracted wherever it was still allowed to
-    /// move.
+    /// [`SpotError`]; the arm has then stopped, and has retracted unless it may no longer move.
     pub fn measure_tip(&mut self, spot: &Point3<f64>) -> Result<TipPoses, SpotError> {
         self.at_spot(spot, |probing, place, normal| {
             let Prober { cell, params, .. } = *probing.prober;

@@ -1,4 +1,4 @@
-//! How references are touched again.
+//! Repeated touches of references.
 
 use nalgebra::UnitQuaternion;
 
@@ -8,19 +8,18 @@ use super::reference::ReferenceContact;
 use crate::probing::arm::ProbeError;
 use crate::probing::plan::TouchResult;
 
-/// Beyond so many standard deviations a contact has moved: once in ten thousand it has not.
+/// Standard deviations beyond which a contact has moved: by chance once in ten thousand.
 const MOVED: f64 = 4.0;
-/// A contact that seems to have moved is touched once more.
+/// Touches of a contact that seems to have moved.
 const LOOKS: usize = 2;
 
 const DOING: &str = "touching a reference again";
 
 impl FeatureProbing<'_, '_> {
-    /// Touches all references again. One that cannot be reached any more is left out, as is one
-    /// whose contact is unclear now.
+    /// Touches all references again, except unreachable ones, and ones with an unclear contact now.
     ///
     /// # Errors
-    /// [`ProbeError::Displaced`] where one is not where it was; as any touch.
+    /// [`ProbeError::Displaced`] if a reference has moved; as any touch.
     pub fn touch_references(&mut self) -> Result<(), Ending> {
         let (flag, rotation) = (self.flag, self.rotation);
         self.prober.references.keep(flag, &rotation, &self.touches);
@@ -42,7 +41,7 @@ impl FeatureProbing<'_, '_> {
         Ok(())
     }
 
-    /// How far it is from where it was; `None` where its contact is unclear.
+    /// Shift of a reference; `None` for an unclear contact.
     fn touch_reference(
         &mut self,
         reference: &ReferenceContact,
@@ -58,7 +57,7 @@ impl FeatureProbing<'_, '_> {
         let (mut sum, mut count) = (0.0, 0.0);
         for _ in 0..LOOKS {
             let (result, _) = match self.go_and_touch(&planned) {
-                // the path was clear when it was touched first
+                // the path was clear at the first touch
                 Err(Ending::Stopped(ProbeError::Obstacle { .. })) => {
                     return Err(self.displaced(reference, "is met before its stand-off".to_owned()));
                 }
@@ -110,7 +109,7 @@ impl FeatureProbing<'_, '_> {
         })
     }
 
-    /// Out into free air, from where it goes on with another orientation.
+    /// Goes out into free air, to go on with another orientation.
     fn go_on_with(&mut self, rotation: &UnitQuaternion<f64>) -> Result<(), Ending> {
         if self.rotation != *rotation {
             self.go_out("going up out of the feature", LineGuard::Out)?;

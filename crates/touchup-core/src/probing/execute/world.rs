@@ -7,14 +7,14 @@ use crate::calibrate::StaticPose;
 use crate::mesh::{FaceHit, FaceTree, TriMesh};
 use crate::probing::arm::{ArmState, Observer};
 
-/// How far a probing has got.
+/// Progress of a probing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Progress {
     /// number of the feature
     pub flag: u32,
-    /// the current touch, from 1 on; 0 before the first
+    /// current touch, from 1 on; 0 before the first
     pub touch: usize,
-    /// touches at most
+    /// maximum number of touches
     pub budget: usize,
     /// standard uncertainty of the wanted number, m or rad
     pub uncertainty: Option<f64>,
@@ -22,45 +22,43 @@ pub struct Progress {
 
 /// The environment of a probing. Each observed state may change the mesh.
 pub trait World: Observer {
-    /// The mesh as it is now, in O.
+    /// The present mesh, in O.
     fn mesh(&self) -> &TriMesh;
 
-    /// The face nearest to a place of O, within a reach (m).
+    /// Face nearest to a place of O, within a reach (m).
     fn closest_face(&self, place: &Point3<f64>, reach: f64) -> Option<FaceHit>;
 
     /// Publishes the progress.
     fn publish(&mut self, progress: &Progress);
 
-    /// Receives the phase that begins.
+    /// Receives a phase at its beginning.
     fn enter(&mut self, _: Phase) {}
 
-    /// Receives each touch when it is made, before the arm goes on; also one that cannot be made,
-    /// with the reason.
+    /// Receives each touch before the arm goes on; also an impossible touch, with the reason.
     ///
     /// - `flag`: number of the feature; 0 for the touches of a spot.
     fn touched(&mut self, _flag: u32, _touch: &ProbedTouch) {}
 
-    /// Receives each static segment of a payload identification when it is measured, before the arm
-    /// goes on.
+    /// Receives each static segment of a payload identification, before the arm goes on.
     fn weighed(&mut self, _segment: &StaticPose) {}
 }
 
-/// What an arm does while it probes.
+/// Activity of a probing arm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Phase {
-    /// nothing yet
+    /// none yet
     Planning,
-    /// it goes through free air
+    /// goes through free air
     Link,
-    /// its sensor is zeroed
+    /// zeroes its sensor
     Zeroing,
-    /// it comes near, slowly
+    /// comes near, slowly
     Approach,
-    /// it touches
+    /// touches
     Search,
-    /// it slides over the surface
+    /// slides over the surface
     Slide,
-    /// it goes back into free air
+    /// goes back into free air
     Retract,
 }
 
@@ -96,11 +94,11 @@ impl World for StaticWorld {
     fn publish(&mut self, _: &Progress) {}
 }
 
-/// Radius around a flag of the surface whose normal is averaged, m.
+/// Radius of the surface around a flag whose mean normal counts, m.
 const AROUND: f64 = 8e-3;
-/// The mesh is searched this far from a flag, m.
+/// Reach of the mesh search from a flag, m.
 const NEAR: f64 = 20e-3;
-/// Faces whose normals differ by more than this (cosine) are another surface.
+/// Minimum cosine between normals of one surface.
 const ALIKE: f64 = 0.7;
 
 /// Distance of a place from the mesh, m; at most the reach.
@@ -112,8 +110,8 @@ pub(super) fn distance(world: &dyn World) -> impl Fn(&Point3<f64>, f64) -> f64 {
     }
 }
 
-/// Outward normal of the surface around a flag: the mean of the faces there that face the handle of
-/// the probe, weighted by their area; where there are none, the shaft.
+/// Outward normal of the surface around a flag: the mean of its faces towards the handle of the
+/// probe, weighted by their area; without such faces, the shaft.
 pub(super) fn normal_about(
     world: &dyn World,
     flag: &Point3<f64>,
@@ -130,14 +128,14 @@ pub(super) fn normal_about(
     Unit::try_new(sum, 0.0).unwrap_or(*shaft)
 }
 
-/// The flag on the mesh: the place below or above it along a direction, where there is one.
+/// The place of the mesh nearest to a flag; the flag itself if none is near.
 pub(super) fn on_mesh(world: &dyn World, flag: &Point3<f64>) -> Point3<f64> {
     world
         .closest_face(flag, NEAR)
         .map_or(*flag, |hit| hit.point)
 }
 
-/// The highest place of the mesh along a direction, m from the origin of O.
+/// Highest place of the mesh along a direction, m from the origin of O.
 pub(super) fn highest(mesh: &TriMesh, up: &Unit<Vector3<f64>>) -> f64 {
     let [low, high] = mesh.bounds();
     (0..3).map(|i| (low[i] * up[i]).max(high[i] * up[i])).sum()

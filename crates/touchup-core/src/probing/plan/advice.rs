@@ -1,4 +1,4 @@
-//! Where a person with a stylus should touch next: by the same reckoning that sends an arm.
+//! Next touch for a person with a stylus, by the same reckoning as for an arm.
 
 use nalgebra::{Point3, Vector3};
 
@@ -21,20 +21,20 @@ pub struct NextTouch {
 /// Places around a round wall; along each side and around each end of a slot.
 const AROUND: usize = 12;
 const ALONG: usize = 5;
-/// Places down a wall, as shares of its depth, and the depth of a wall whose own is not known, of
-/// its radius.
+/// Places down a wall, as shares of its depth, and the depth of a wall of unknown depth, over its
+/// radius.
 const DOWN: [f64; 3] = [0.2, 0.5, 0.8];
 const UNKNOWN_DEPTH: f64 = 1.0;
-/// Standard deviation of one place, m, however often it is touched by hand: the error of the
+/// Standard deviation of one place, m, after any number of touches by hand: the error of the
 /// calibration is shared.
 const PLACE_SIGMA: f64 = 20e-6;
-/// Walls are perpendicular to the surface around them within this, rad.
+/// Standard deviation of walls from perpendicular to the surface around them, rad.
 const SQUARE: f64 = 0.02;
-/// Enough is known when each number of the feature has this standard deviation, m.
+/// Sufficient standard deviation of each number of the feature, m.
 const ENOUGH: f64 = 10e-6;
 
-/// The touch with the largest gain for the numbers of a feature; `None` when enough is known, or it
-/// has no wall.
+/// Touch with the largest gain for the numbers of a feature; `None` if they are good enough, or
+/// without a wall.
 ///
 /// - `touches`: all touches; the feature names its own by their numbers.
 pub fn advise_next_touch(feature: &Feature, touches: &[ProbedPoint]) -> Option<NextTouch> {
@@ -76,7 +76,7 @@ fn best<M: Surface>(
 ) -> Option<NextTouch> {
     let pose_of = surface.pose_of();
     let (up, sign) = match feature.kind {
-        // a boss rises from its foot, and what is out of its middle is out of the part
+        // a boss rises from its foot, and out of its middle is out of the part
         Kind::Boss => (*axis, 1.0),
         _ => (-axis, -1.0),
     };
@@ -192,7 +192,7 @@ mod tests {
             .collect();
         let (feature, touches) = hole(&touched);
         let next = advise_next_touch(&feature, &touches).unwrap();
-        // touched where x is above 0
+        // touches are at x above 0
         assert!(
             next.place.x < -3e-3 && (next.place.xy().coords.norm() - 4e-3).abs() < 1e-9,
             "{next:?}"

@@ -1,11 +1,11 @@
-//! What all touches of an arm have in common, and no number of them averages out: it enters each
-//! number by its derivatives.
+//! Uncertainty common to all touches of an arm, which no number of them averages out: it enters
+//! each number by its derivatives.
 //!
-//! A radius that is off by ρ, a part that lies off by t and is turned by ω (both in O) about the
-//! place p₀ at which its registration is known best shift a feature at p by t + ω × (p − p₀), turn
-//! its axis by ω, and change a diameter or a width by 2ρ, a plane by ρ, an edge by both of its
-//! faces. With standard uncertainties u_t and u_ω for each axis the shift has the covariance
-//! u_t² I + u_ω² (|l|² I − l lᵀ), l = p − p₀ \[JCGM 100:2008, 5.2\].
+//! A radius off by ρ, and a part that lies off by t and is turned by ω (both in O) about the place
+//! p₀ of its best registration shift a feature at p by t + ω × (p − p₀), turn its axis by ω, and
+//! change a diameter or a width by 2ρ, a plane by ρ, an edge by both of its faces. With standard
+//! uncertainties u_t and u_ω for each axis the shift has the covariance u_t² I + u_ω² (|l|² I − l
+//! lᵀ), l = p − p₀ \[JCGM 100:2008, 5.2\].
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
@@ -13,7 +13,7 @@ use crate::features::{Feature, Kind, Measured};
 use crate::parameters;
 
 parameters! {
-    /// Standard uncertainties of what is told of an arm and of the place of its part.
+    /// Standard uncertainties of an arm and of the place of its part.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct ArmUncertainty in "robot" {
         /// Standard uncertainty of the radius of the ball: twice of it is in each diameter, width
@@ -55,7 +55,7 @@ impl ArmUncertainty {
         Matrix3::identity() * along_each + (square - lever * lever.transpose()) * self.turn.powi(2)
     }
 
-    /// Of the place of a feature in the direction in which it is largest, m.
+    /// Standard uncertainty of a feature's place in its most uncertain direction, m.
     ///
     /// - `out`: of the surface, unit vector.
     pub(super) fn position(&self, kind: Kind, place: &Point3<f64>, out: &Vector3<f64>) -> f64 {
@@ -63,13 +63,13 @@ impl ArmUncertainty {
         let largest = shift.symmetric_eigenvalues().max().max(0.0).sqrt();
         match kind {
             Kind::Plane => along(&shift, out).hypot(self.radius),
-            // each of its faces is one number
+            // each face is one number
             Kind::Edge => largest.hypot(self.radius),
             _ => largest,
         }
     }
 
-    /// The feature with what all touches have in common in the uncertainty of each of its numbers.
+    /// The feature with the common uncertainty in each of its numbers.
     pub(super) fn widened(&self, mut feature: Feature) -> Feature {
         let (radius, shift) = (self.radius, self.shift(&feature.centre.value));
         if let Some(axis) = feature.axis.as_ref().map(|axis| axis.value) {
@@ -112,7 +112,7 @@ fn along(covariance: &Matrix3<f64>, direction: &Vector3<f64>) -> f64 {
     direction.dot(&(covariance * direction)).max(0.0).sqrt()
 }
 
-/// A number that nothing determines stays so.
+/// An undetermined number stays so.
 fn widen<T>(measured: &mut Measured<T>, by: f64) {
     measured.std = measured.std.map(|std| std.hypot(by));
 }
@@ -121,8 +121,8 @@ fn widen<T>(measured: &mut Measured<T>, by: f64) {
 mod tests {
     use super::*;
 
-    /// A hole 30 mm along x from where the part is known best, its axis along z: a turn about z
-    /// moves it along y, one about y along z, which does not count; about x nothing.
+    /// A hole 30 mm along x from the best-known place of the part, its axis along z: a turn about z
+    /// moves it along y, a turn about y along z, which does not count; a turn about x does nothing.
     #[test]
     fn shared_parts_are_those_reckoned_by_hand() {
         let known = ArmUncertainty {

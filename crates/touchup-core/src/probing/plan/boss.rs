@@ -1,4 +1,4 @@
-//! A boss from one flag: its top, where the ground begins beside it in three directions, then its
+//! A boss from one flag: its top, the start of the ground beside it in three directions, then its
 //! wall from outside.
 
 use nalgebra::Vector3;
@@ -14,26 +14,26 @@ use crate::features::Feature;
 use crate::features::fit::Observation;
 use crate::numeric::mean;
 
-/// The distance of the search outward grows by this factor.
+/// Growth of the distance in the search outward.
 const FARTHER: f64 = 1.4;
-/// No boss is larger, m.
+/// Maximum distance of this search, m: no boss is larger.
 const LARGEST: f64 = 30e-3;
-/// Lower than the top by this, over the ball's radius, is beside it.
+/// Depth below the top that is beside the boss, over the ball's radius.
 const BESIDE: f64 = 1.2;
-/// The ball stays this far above the ground, m.
+/// Distance of the ball above the ground, m.
 const OFF_GROUND: f64 = 0.4e-3;
-/// The top is slid over so far towards its middle.
+/// Reach of slides over the top towards its middle, over its radius.
 const HALF: f64 = 0.5;
-/// Heights within this are of one surface, m.
+/// Maximum difference of heights on one surface, m.
 const FLAT: f64 = 0.3e-3;
 
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 enum BossPhase {
     #[default]
     Top,
-    /// out of the top, to a distance from the middle that is tried, m
+    /// down beside the top, at this distance from the middle, m
     Out(f64),
-    /// inward from there
+    /// inward from this distance, m
     In(f64),
     Ground,
     Wall,
@@ -42,7 +42,7 @@ enum BossPhase {
 #[derive(Clone, Debug, Default)]
 pub(super) struct BossPattern {
     phase: BossPhase,
-    /// from above
+    /// contacts from above
     seen: Vec<Observation>,
     wall: RoundWall,
     ground: Vec<Observation>,
@@ -65,8 +65,8 @@ impl BossPattern {
         }
     }
 
-    /// How far below the top the wall is touched: between the edge of the top and the ground, m; at
-    /// the highest and the deepest.
+    /// Depth of touches of the wall below the top, between the edge of the top and the ground, m:
+    /// highest and deepest.
     fn depths(&self, context: &SearchContext) -> Result<[f64; 2], ExploreError> {
         context.above_ground("boss", self.ground_z, OFF_GROUND)
     }
@@ -112,7 +112,7 @@ impl BossPattern {
         self.wall.measuring.take(touch);
         if self.wall.measuring.observations.len() == before && touch.result == TouchResult::Unclear
         {
-            // another surface was hit
+            // contact with another surface
             self.phase = BossPhase::Out(distance * FARTHER);
             return;
         }

@@ -1,4 +1,4 @@
-//! The wall of a hole or boss: its requested numbers, and its candidate touches.
+//! Wall of a hole or boss: its requested numbers, and its candidate touches.
 
 use std::f64::consts::{SQRT_2, TAU};
 
@@ -15,25 +15,25 @@ use crate::features::fit::{
 };
 use crate::numeric::{NormalEquations, mean};
 
-/// Directions that are candidates.
+/// Candidate directions.
 const DIRECTIONS: usize = 24;
-/// Of a round wall.
+/// Freedoms in which a round wall may lean.
 const LEAN: [Freedom; 2] = [Freedom::TiltX, Freedom::TiltY];
-/// Walls lean when they do so by more than this many standard deviations.
+/// Standard deviations of a lean that is significant.
 const LEANS: f64 = 4.0;
-/// … by so many touches more than there are unknowns: of fewer a single one that met something else
-/// makes a lean.
+/// Touches beyond the unknowns for a significant lean: among fewer, a single contact with another
+/// object makes a lean.
 const LEAST_DEGREES: usize = 6;
-/// … and then by no more than this, rad.
+/// Maximum lean of a wall, rad.
 const MOST_LEAN: f64 = 0.3;
-/// So many touches before it is believed.
+/// Minimum number of touches for a credible wall.
 const LEAST_WALL: usize = 8;
-/// First directions.
+/// Number of first directions.
 pub(super) const FIRST: usize = 3;
-/// More directions that are tried after a miss in the first one.
+/// Maximum number of first directions, after misses.
 pub(super) const MOST_FIRST: usize = 6;
 
-/// A round wall that is being touched.
+/// A round wall during its touches.
 #[derive(Clone, Debug, Default)]
 pub(super) struct RoundWall {
     pub measuring: Measuring,
@@ -49,7 +49,7 @@ impl RoundWall {
         toward((at as f64 + 0.5 * (at / FIRST) as f64) / FIRST as f64)
     }
 
-    /// Why there is none after these directions.
+    /// Error for a missing wall after these directions.
     pub fn missing(&self, asked: usize, reach: f64) -> ExploreError {
         let kind = if self.is_boss { "boss" } else { "hole" };
         ExploreError::NoWall {
@@ -66,7 +66,7 @@ impl RoundWall {
         self.recentre(context);
     }
 
-    /// The middle of the circle through the contacts.
+    /// Moves the middle to the circle through the contacts.
     pub fn recentre(&mut self, context: &SearchContext) {
         if let Some((centre, _)) = self.circle(context) {
             self.middle = centre;
@@ -83,7 +83,7 @@ impl RoundWall {
         circle_through(&points)
     }
 
-    /// As far as is known, m.
+    /// Estimated radius, m.
     pub fn radius(&self, context: &SearchContext) -> f64 {
         let ball = context.params.ball_radius;
         let centres = self.circle(context).map_or(0.0, |(_, radius)| radius);
@@ -152,13 +152,13 @@ impl RoundWall {
             .uncertainty(&guess, &self.wanted(context, &guess))
     }
 
-    /// The touch of the wall with the largest gain.
+    /// Touch of the wall with the largest gain.
     ///
     /// - `depths`: below the surface, m.
     pub fn next(&mut self, context: &SearchContext, depths: [f64; 2]) -> Option<TouchPlan> {
         let surface = self.guess(context);
         let ball = context.params.ball_radius;
-        // in a hole from the middle, of a boss from beside it
+        // in a hole from the middle, at a boss from beside it
         let from = if self.is_boss {
             surface.radius + ball + context.params.clearance
         } else {
@@ -190,7 +190,7 @@ impl RoundWall {
             .next(&surface, &wanted, context.on_part(possible))
     }
 
-    /// The cylinder through the contacts of the wall, perpendicular to a surface.
+    /// Cylinder through the contacts of the wall, perpendicular to a surface.
     pub fn fitted(
         &self,
         context: &SearchContext,
@@ -215,7 +215,7 @@ impl RoundWall {
 
     /// Paths along the wall and across its rim.
     ///
-    /// - `back`: how far the surface above the rim is known, m; `depths`: below it, m; `room`:
+    /// - `back`: extent of the known surface above the rim, m; `depths`: below it, m; `room`:
     ///   beside the ball at the wall, m.
     pub fn slides(
         &self,
@@ -226,7 +226,7 @@ impl RoundWall {
     ) -> Vec<Slide> {
         let radius = self.radius(context);
         let middle = Point3::new(self.middle.x, self.middle.y, context.height);
-        // the open is around a boss, and inside of a hole
+        // the open is around a boss, and inside a hole
         let side = if self.is_boss { 1.0 } else { -1.0 };
         let at = &|share: f64| (middle + toward(share) * radius, toward(share) * side);
         RimStation {
@@ -242,21 +242,20 @@ impl RoundWall {
 }
 
 impl SearchContext {
-    /// How far walls may lean against the normal of a surface, standard deviation in each of two
-    /// directions, rad.
+    /// Lean of walls against the normal of a surface, standard deviation in each of two directions,
+    /// rad.
     ///
-    /// - `lean`: of that normal as it was measured, likewise.
+    /// - `lean`: of that normal as measured, likewise.
     pub fn square(&self, lean: f64) -> f64 {
         self.params.square.hypot(lean)
     }
 }
 
-/// What is known before of how much walls lean against the axis of a guess, rad in each of two
-/// directions, and how they are fitted: within that, or freely where their touches say that they
-/// lean by more.
+/// Prior of the lean of walls against the axis of a guess, rad in each of two directions, and
+/// settings of their fit: within that prior, or free if their touches show a larger lean.
 ///
-/// - `known`: of walls that are perpendicular to their surface, rad; `leans`: what may say that
-///   they are not.
+/// - `known`: prior for walls perpendicular to their surface, rad; `leans`: freedoms that may show
+///   a lean.
 pub(super) fn squareness<M: Surface>(
     known: f64,
     guess: &M,
@@ -267,7 +266,7 @@ pub(super) fn squareness<M: Surface>(
         .ok()
         .filter(|free| free.degrees >= LEAST_DEGREES);
     let is_leaning = freely.is_some_and(|free| {
-        // how far its axis is off that of the guess, in the directions of its own x and y
+        // its axis against the guess's, in the directions of its own x and y
         let before = guess.pose_of().rotation * Vector3::z();
         let off = free.surface.pose_of().inverse_transform_vector(&before);
         leans.iter().any(|lean| {
@@ -292,10 +291,10 @@ pub(super) fn squareness<M: Surface>(
     }
 }
 
-/// A wall is searched so much farther than expected, m.
+/// Search beyond an expected wall, m.
 const REACH: f64 = 3e-3;
 
-/// The plane through the contacts of the surface about a place of F.
+/// Plane through the contacts of the surface about a place of F.
 pub(super) fn surface_about(
     context: &SearchContext,
     middle: &Point3<f64>,
@@ -331,8 +330,8 @@ mod tests {
 
     const BALL: f64 = 1.5e-3;
 
-    /// Centres of a ball that touches a hole of 8 mm, whose axis leans towards x by an angle, at
-    /// two depths; by hand.
+    /// Centres of a ball on a hole of 8 mm, whose axis leans towards x by an angle, at two depths;
+    /// by hand.
     fn touches(lean: f64) -> Vec<Observation> {
         let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), lean);
         let place = |group: u32| {
@@ -351,8 +350,7 @@ mod tests {
         (0..12).map(place).collect()
     }
 
-    /// A hole that is square within what is believed is fitted as one; one that leans by 5° is
-    /// measured as it is.
+    /// The fit of a hole within the prior is square; a hole that leans by 5° is measured as it is.
     #[test]
     fn walls_that_lean_are_not_taken_for_square_ones() {
         let guess = Cylinder::new(Point3::origin(), &Vector3::z(), 4e-3, true);
@@ -365,7 +363,7 @@ mod tests {
         let axis = fit(&guess, &leaning, &params).unwrap().surface.axis();
         let drawn = Vector3::new(5f64.to_radians().sin(), 0.0, 5f64.to_radians().cos());
         assert!(axis.cross(&drawn).norm() < 3e-3, "{axis:?}");
-        // half of them: not enough to say so
+        // half of them: not enough for a lean
         assert_eq!(
             squareness(known, &guess, &leaning[..6], &LEAN).1.axis_sigma,
             Some(known)

@@ -1,10 +1,10 @@
-//! A decision as the goal of a search: touches are made until each characteristic of the feature
+//! A decision as the goal of a search: touches go on until each characteristic of the feature
 //! passes or fails.
 //!
-//! A characteristic with a distance d of its value from the nearest limit is decided where its
-//! standard uncertainty u is d/z, z u being the guard band. So that is what is asked for of an open
-//! number; nothing of one that is decided, or that no touch decides. As it is looked at after each
-//! touch, z is that of repeated looks ([`repeated_confidence`]).
+//! A characteristic with a distance d of its value from the nearest limit is decided at a standard
+//! uncertainty u of d/z, with a guard band of z u. So the search requests d/z of an open number,
+//! and nothing of numbers that are decided, or that no touch decides. As there is a look after each
+//! touch, z is the quantile of repeated looks ([`repeated_confidence`]).
 
 use nalgebra::Point3;
 
@@ -16,58 +16,57 @@ use crate::conformity::{
 use crate::features::{Feature, Kind};
 use crate::numeric::normal_quantile;
 
-/// A characteristic that is to be decided.
+/// A characteristic to decide.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SoughtCharacteristic {
-    /// as the drawing names it
+    /// name in the drawing
     pub name: String,
-    /// what of the feature
+    /// quantity of the feature
     pub quantity: InspectedQuantity,
-    /// m
+    /// limits, m
     pub limits: ToleranceLimits,
-    /// centre of the feature in the drawing, m in O; a position needs it
+    /// centre of the feature in the drawing, m in O; required for a position
     pub nominal: Option<Point3<f64>>,
 }
 
-/// What a feature is probed for.
+/// Decisions as the goal of probing a feature.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DecisionGoal {
-    /// all of one feature
+    /// all characteristics, of one feature
     pub characteristics: Vec<SoughtCharacteristic>,
-    /// how it is decided; the confidence is that of all looks together
+    /// decision rule; its confidence is for all looks together
     pub params: DecisionParams,
 }
 
-/// A characteristic after the touches so far.
+/// A characteristic after some touches.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DecidedCharacteristic {
-    /// which
+    /// the characteristic
     pub sought: SoughtCharacteristic,
-    /// m; `None` where the touches do not fix it yet
+    /// measured value, m; `None` while the touches do not fix it
     pub measured: Option<MeasuredNumber>,
-    /// the part of its standard uncertainty that all touches have in common, m
+    /// part of its standard uncertainty common to all touches, m
     pub shared: f64,
-    /// the decision, with the guard bands of repeated looks
+    /// decision, with the guard bands of repeated looks
     pub assessment: Assessment,
-    /// whether it stays open however often the feature is touched
+    /// whether any number of touches leaves it open
     pub is_limited: bool,
 }
 
-/// Where what touches leave is this share of what all of them have in common, more touches add a
-/// twentieth at most.
+/// Uncertainty by touches over the common uncertainty, below which more touches add a twentieth at
+/// most.
 const LEAST_SHARE: f64 = 1.0 / 3.0;
-/// More touches move a value by no more than so many of the standard deviations that they have
-/// left.
+/// Maximum shift of a value by more touches, in standard deviations of the present touches.
 const MOVES: f64 = 3.0;
-/// Values within that which are tried.
+/// Values tried on either side within this shift.
 const TRIED: i32 = 12;
-/// No number is asked for better than this share of what it has: it may move away from its limit.
+/// Least requested deviation of a number over its present one: it may move away from its limit.
 const LEAST_STEP: f64 = 0.25;
-/// No surface is believed after fewer touches, so there is no look before.
+/// Minimum number of touches for a credible surface, and so for a first look.
 const FEWEST: usize = 6;
 
 impl DecisionGoal {
-    /// Whether touches are planned for a quantity of a kind.
+    /// Whether touches exist for a quantity of a kind.
     pub fn decides(kind: Kind, quantity: InspectedQuantity) -> bool {
         use InspectedQuantity::{Diameter, Length, Position, Width, X, Y, Z};
         match quantity {
@@ -79,9 +78,9 @@ impl DecisionGoal {
         }
     }
 
-    /// The rule of one look of many.
+    /// Decision rule of one look among many.
     ///
-    /// - `budget`: touches of the feature at most.
+    /// - `budget`: maximum number of touches of the feature.
     pub(super) fn of_one_look(&self, budget: usize) -> DecisionParams {
         DecisionParams {
             confidence: repeated_confidence(self.params.confidence, FEWEST, budget),
@@ -89,10 +88,10 @@ impl DecisionGoal {
         }
     }
 
-    /// What the touches say of each.
+    /// State of each characteristic after the touches.
     ///
-    /// - `feature`: with all that is uncertain of it; `by_touches`: with the uncertainties of its
-    ///   touches alone; `None` where they do not fix its shape, and then nothing is decided.
+    /// - `feature`: with its full uncertainty, and with that of its touches alone; `None` if they
+    ///   do not fix its shape, and then nothing is decided.
     pub(super) fn standing(
         &self,
         params: &DecisionParams,
@@ -141,7 +140,7 @@ fn decided(
             (-TRIED..=TRIED).all(|at| is_open_at(moved(at)))
                 || own <= LEAST_SHARE * shared && is_open_at(value)
         };
-        // what its touches do not fix stays without a number
+        // a number that its touches do not fix stays open
         is_limited = assessment.decision == Decision::Undecided
             && parts.is_none_or(|(_, own)| stays_open(own));
     }
@@ -155,12 +154,12 @@ fn decided(
 }
 
 impl DecidedCharacteristic {
-    /// Whether touches could still decide it.
+    /// Whether touches can still decide it.
     pub fn is_open(&self) -> bool {
         self.assessment.decision == Decision::Undecided && !self.is_limited
     }
 
-    /// The standard deviation that its touches should leave, m; `None` where nothing is asked for.
+    /// Standard deviation to reach by touches, m; `None` without a request.
     fn asked(&self, guard: f64) -> Option<f64> {
         let MeasuredNumber { value, std, .. } = self.measured.filter(|_| self.is_open())?;
         let ToleranceLimits { lower, upper } = self.sought.limits;
@@ -175,8 +174,7 @@ impl DecidedCharacteristic {
     }
 }
 
-/// What is asked of the numbers of a feature; the half of a diameter of position is the place
-/// itself.
+/// Requested deviations of a feature's numbers; half the diameter of position is the place itself.
 pub(super) fn open_numbers(
     standing: &[DecidedCharacteristic],
     params: &DecisionParams,
@@ -231,7 +229,7 @@ mod tests {
         )
     }
 
-    /// 0.5 from its limit, a guard band of 1.645 u: u has to be 0.304, of which 0.1 is no touch's.
+    /// 0.5 from its limit, with a guard band of 1.645 u: u has to be 0.304, and 0.1 is no touch's.
     #[test]
     fn an_open_number_is_asked_for_as_well_as_its_distance_from_the_limit_needs() {
         let open = diameter(10.5, 0.4, 0.1);
@@ -260,8 +258,8 @@ mod tests {
         }
     }
 
-    /// The shared part alone has a guard band of 0.33, and its value is 0.05 from the limit: where
-    /// its touches say so within 0.09, it stays.
+    /// The shared part alone has a guard band of 0.33, and the value is 0.05 from the limit:
+    /// touches that say so within 0.09 leave it open.
     #[test]
     fn what_the_shared_part_leaves_open_is_limited_and_what_touches_may_move_is_not() {
         assert!(diameter(10.95, 0.08, 0.2).is_limited);

@@ -2,8 +2,8 @@
 //!
 //! With the covariance C of a surface's freedoms, a touch with derivatives g of its distance and
 //! deviation σ leaves C' = C − C g gᵀ C / (σ² + gᵀ C g), so a number that changes with the freedoms
-//! as c loses (cᵀ C g)² / (σ² + gᵀ C g) of its variance \[Atkinson Donev 1992, c-optimality\].
-//! Touches are chosen one after the other, each as if those before had been made.
+//! as c loses (cᵀ C g)² / (σ² + gᵀ C g) of its variance \[Atkinson Donev 1992, c-optimality\]. The
+//! choice is one touch after the other, each as if the earlier ones had been made.
 
 use nalgebra::{Point3, SMatrix};
 
@@ -11,10 +11,10 @@ use crate::features::fit::{FREEDOMS, Fit, Freedom, Steps, Surface};
 
 type InformationMatrix = SMatrix<f64, FREEDOMS, FREEDOMS>;
 
-/// A touch that could be made.
+/// A possible touch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Candidate {
-    /// Where the surface would be touched, m in O.
+    /// Place of the touch on the surface, m in O.
     pub point: Point3<f64>,
     /// Standard deviation along the normal, m.
     pub sigma: f64,
@@ -23,17 +23,17 @@ pub struct Candidate {
 /// The requested numbers of a surface.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Asked {
-    /// For each number how it changes with the freedoms, over its requested deviation.
+    /// Derivatives of each number by the freedoms, over its requested deviation.
     by: Vec<Steps>,
-    /// the same for numbers not requested that must not stay undetermined
+    /// the same for other numbers, which must not stay undetermined
     rest: Vec<Steps>,
 }
 
-/// A number not requested may have so many times the requested deviation.
+/// Allowed deviation of such a number, over the requested deviation.
 const REST: f64 = 8.0;
 
 impl Asked {
-    /// One more number, that is to be known with a standard deviation of `sigma` (m or rad).
+    /// Adds a number with a requested standard deviation of `sigma` (m or rad).
     pub fn and(mut self, by: &[(Freedom, f64)], sigma: f64) -> Self {
         let mut steps = Steps::zeros();
         by.iter()
@@ -42,7 +42,7 @@ impl Asked {
         self
     }
 
-    /// Several more, each of one freedom.
+    /// Adds several numbers, each of one freedom.
     pub(super) fn each(self, freedoms: &[Freedom], sigma: f64) -> Self {
         freedoms
             .iter()
@@ -54,10 +54,10 @@ impl Asked {
         self.by.iter().all(|by| fit.std_of(by).is_some())
     }
 
-    /// With all freedoms of a surface to be known roughly: a number comes of a fit, and a fit in
-    /// which another one is open goes astray by its curvature.
+    /// Adds all freedoms of a surface with a rough request: a number comes from a fit, and a fit
+    /// with another number open goes astray by its curvature.
     ///
-    /// - `sigma`: requested of the numbers, m; `size`: of the surface, m, by which a lean counts.
+    /// - `sigma`: requested of the numbers, m; `size`: of the surface, m, as the lever of a lean.
     pub fn and_the_rest<M: Surface>(mut self, sigma: f64, size: f64) -> Self {
         for freedom in Freedom::ALL
             .into_iter()
@@ -72,15 +72,15 @@ impl Asked {
     }
 }
 
-/// What is known of a surface's freedoms.
+/// Covariance of a surface's freedoms.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Knowledge {
     covariance: InformationMatrix,
 }
 
 impl Knowledge {
-    /// Before any touch: each freedom of the surface is known within `length` (m) or `angle` (rad),
-    /// standard deviations.
+    /// Before any touch: standard deviations of `length` (m) or `angle` (rad) for each freedom of
+    /// the surface.
     pub fn before<M: Surface>(length: f64, angle: f64) -> Self {
         let sigma = Freedom::ALL.map(|freedom| match freedom {
             _ if !M::FREE[freedom as usize] => 0.0,
@@ -95,12 +95,12 @@ impl Knowledge {
         }
     }
 
-    /// With one more touch of the surface.
+    /// After one more touch of the surface.
     pub fn with<M: Surface>(&self, surface: &M, touch: &Candidate) -> Self {
         let (_, g) = surface.derivatives(&touch.point);
         let cg = self.covariance * g;
         let covariance = self.covariance - cg * cg.transpose() / (touch.sigma.powi(2) + g.dot(&cg));
-        // rounding must not make it lopsided
+        // symmetric in spite of rounding
         Self {
             covariance: (covariance + covariance.transpose()) / 2.0,
         }
@@ -112,7 +112,7 @@ impl Knowledge {
         g.dot(&(self.covariance * g)).max(0.0).sqrt()
     }
 
-    /// The largest of the deviations over the requested ones; at most 1 when all are met.
+    /// Largest deviation over its request; at most 1 if all requests are met.
     pub fn worst(&self, asked: &Asked) -> f64 {
         let shares = asked
             .by
@@ -121,8 +121,8 @@ impl Knowledge {
         shares.fold(0.0, f64::max)
     }
 
-    /// How much a touch would take from the sum over the requested numbers of (deviation /
-    /// requested deviation)².
+    /// Reduction by a touch of the sum over the requested numbers of (deviation / requested
+    /// deviation)².
     pub fn gain<M: Surface>(&self, surface: &M, touch: &Candidate, asked: &Asked) -> f64 {
         let (_, g) = surface.derivatives(&touch.point);
         let cg = self.covariance * g;
@@ -135,10 +135,10 @@ impl Knowledge {
         reduction / (touch.sigma.powi(2) + g.dot(&cg))
     }
 
-    /// The candidate with the largest gain, the first among equals, and its gain; `None` when none
-    /// has a gain.
+    /// Candidate with the largest gain, the first among equals, and its gain; `None` without a
+    /// gain.
     ///
-    /// - `touch`: that a candidate stands for.
+    /// - `touch`: of a candidate.
     pub fn best<M: Surface, T>(
         &self,
         surface: &M,

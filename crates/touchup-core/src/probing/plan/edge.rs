@@ -1,5 +1,5 @@
-//! An edge from one flag: which side of it the ground is on, then both faces beside it, in turn
-//! across the edge.
+//! An edge from one flag: its side with the ground, then both faces beside it, in turn across the
+//! edge.
 
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
 
@@ -14,52 +14,52 @@ use crate::features::Feature;
 use crate::features::fit::{FitParams, Freedom, Observation, Plane};
 use crate::numeric::mean;
 
-/// Lower by this, over the ball's radius, is beyond the edge.
+/// Depth below the top that is beyond the edge, over the ball's radius.
 const BEYOND: f64 = 0.8;
 /// Places on the high side, back from the flag and along the edge, over the radius of the ring.
 const MORE: [[f64; 2]; 4] = [[0.5, -0.9], [0.5, 0.9], [1.3, -0.6], [1.3, 0.6]];
-/// Back from the flag where one of these is beside the part; along the edge as many steps to both
-/// sides.
+/// Distances back from the flag that replace a place beside the part; along the edge equal steps to
+/// both sides.
 const ELSEWHERE: [f64; 4] = [0.5, 0.8, 1.1, 1.4];
-/// The ground is what was touched beyond this share of the farthest.
+/// Share of the farthest low touch beyond which a touch is of the ground.
 const CLEAR: f64 = 0.7;
-/// Where that is so high that it may be the rim, the ground is touched this much farther out, over
-/// the ball's radius.
+/// Distance of a touch of the ground farther out, over the ball's radius, if the low touches are
+/// high enough to be on the rim.
 const FARTHER: f64 = 2.0;
 /// Depth of the search for the ground, over the ball's radius.
 const GROUND: f64 = 4.0;
-/// The ball stays this far above the ground, m.
+/// Distance of the ball above the ground, m.
 const OFF_GROUND: f64 = 0.3e-3;
-/// First touches of the side, that determine the direction of the edge.
+/// First touches of the side, for the direction of the edge.
 const FIRST: usize = 3;
-/// So many are tried.
+/// Maximum number of tries for these.
 const MOST_FIRST: usize = 6;
-/// They are this far apart along the edge, over the radius around the flag.
+/// Their distance along the edge, over the radius around the flag.
 const SPREAD: f64 = 1.0;
-/// Shares of that which are tried in turn where the edge ends before it.
+/// Shares of this distance, tried in turn if the edge ends before it.
 const NEARER: [f64; 4] = [1.0, 0.75, 0.5, 0.25];
-/// Touches along the edge reach this far to either side, over the same.
+/// Reach of touches along the edge to either side, over the same radius.
 const REACH: f64 = 2.0;
-/// Places along the edge that are candidates.
+/// Candidate places along the edge.
 const ALONG: usize = 9;
-/// Touches of the top stay this far from the edge, over the ball's radius; and this far at most.
+/// Least and largest distance of touches of the top from the edge, over the ball's radius.
 const TOP: [f64; 2] = [0.7, 4.0];
-/// Slides come so far over the top, over the same.
+/// Reach of slides over the top, over the ball's radius.
 const BACK: f64 = 3.0;
-/// What leans more is another surface, rad.
+/// Lean above which a face is another surface, rad.
 const LEAN: f64 = 0.1;
-/// So many touches of each face before it is believed.
+/// Minimum number of touches for a credible face.
 const LEAST: usize = 4;
 
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 enum EdgePhase {
-    /// places around the flag are sorted into high and low
+    /// sorting of places around the flag into high and low
     #[default]
     Ring,
     Top,
-    /// the surface is the same all around
+    /// an equal surface all around
     NoEdge,
-    /// what was low may have been the rim: beyond it
+    /// beyond the low places, which may have been on the rim
     Ground,
     Side,
     Both,
@@ -73,9 +73,9 @@ pub(super) struct EdgePattern {
     seen: Vec<(Point3<f64>, Option<Observation>)>,
     top: Measuring,
     side: Measuring,
-    /// out over the edge, and along it, in F
+    /// out over the edge, in F
     over: Vector3<f64>,
-    /// of the ground beyond, in F
+    /// height of the ground beyond, in F
     ground_z: f64,
     is_top_next: bool,
 }
@@ -98,9 +98,9 @@ impl EdgePattern {
         params.flag_radius + params.ball_radius
     }
 
-    /// Keeps a touch from above, also a miss.
+    /// Records a touch from above, also a miss.
     fn record(&mut self, context: &SearchContext, touch: &Touched) {
-        // as deep as the search went
+        // end of the search
         let lowest = || context.in_f(&touch.planned.end());
         if touch.result != TouchResult::Unclear {
             self.seen
@@ -109,8 +109,8 @@ impl EdgePattern {
         self.tried += 1;
     }
 
-    /// Parts the touches into high and low, and finds the direction over the edge; whether there
-    /// are both.
+    /// Parts the touches into high and low, and finds the direction over the edge; returns whether
+    /// there are both.
     fn part(&mut self, context: &mut SearchContext) -> bool {
         let ring = || self.seen.iter().take(RING + 1).map(|(place, _)| place);
         context.height = ring()
@@ -157,7 +157,7 @@ impl EdgePattern {
         }
     }
 
-    /// Some more on the high side: of the ring too few may lie on it to determine its normal.
+    /// Takes more on the high side: too few of the ring may lie on it to determine its normal.
     fn take_top(&mut self, context: &mut SearchContext, touch: &Touched) {
         self.record(context, touch);
         if self.tried < MORE.len() {
@@ -189,8 +189,8 @@ impl EdgePattern {
         };
     }
 
-    /// A ball that hangs on the rim is less than its radius beyond the edge; farther out by more
-    /// than that is the ground.
+    /// A ball on the rim is less than its radius beyond the edge; farther out by more is the
+    /// ground.
     fn take_ground(&mut self, context: &SearchContext, touch: &Touched) {
         if touch.result != TouchResult::Unclear {
             self.ground_z = context.below(
@@ -202,12 +202,12 @@ impl EdgePattern {
         self.phase = EdgePhase::Side;
     }
 
-    /// How far below the top the side is touched, m; at the highest and the deepest.
+    /// Depths of touches of the side below the top, m: highest and deepest.
     fn depths(&self, context: &SearchContext) -> Result<[f64; 2], ExploreError> {
         context.above_ground("edge", self.ground_z, OFF_GROUND)
     }
 
-    /// The side through its contacts: with its z out of the material, x along the edge.
+    /// Side through its contacts: z out of the material, x along the edge.
     fn side_plane(&self, context: &SearchContext) -> Plane {
         let points: Vec<_> = self
             .side
@@ -216,7 +216,7 @@ impl EdgePattern {
             .map(|o| context.in_f(&o.point))
             .collect();
         let mean = mean(points.iter().map(|p| p.coords));
-        // a line along the edge by least squares: how much farther over by each metre along
+        // a least-squares line along the edge: metres over it per metre along it
         let (mut sxx, mut sxy) = (0.0, 0.0);
         for p in &points {
             let d = p.coords - mean;
@@ -232,14 +232,14 @@ impl EdgePattern {
     }
 
     fn top_plane(&self, context: &SearchContext) -> Plane {
-        // over the edge is x, so that its leans are along and across the edge
+        // x is over the edge, so that its leans are along and across the edge
         let at = context.in_f(&self.side_plane(context).point());
         plane(context, at.coords, [self.over, self.along(), Vector3::z()])
     }
 
-    /// What is wanted of the top, whose y runs along the edge, or of the side, whose x does.
+    /// Request for the top, with y along the edge, or for the side, with x along it.
     fn wanted(params: &PatternParams, lean: Freedom) -> Wanted {
-        // as far as it was touched
+        // within the reach of its touches
         Wanted::of_plane(params, &[lean], REACH * params.flag_radius, LEAN, 0)
     }
 
@@ -290,7 +290,7 @@ impl EdgePattern {
         )
     }
 
-    /// Of the top or of the side, whichever gains more.
+    /// Next touch of the top or of the side, by the larger gain.
     fn next_of_both(&mut self, context: &SearchContext, deep: f64) -> Option<TouchPlan> {
         let (top, side) = (self.top_plane(context), self.side_plane(context));
         let [of_top, of_side] =
@@ -359,7 +359,7 @@ impl Stage for EdgePattern {
                     [0.0, SPREAD, -SPREAD][self.tried % FIRST] * flag_radius,
                     ring + ball,
                 );
-                // where the edge ends before that, nearer to the flag
+                // nearer to the flag if the edge ends before
                 let high = |along: f64| Point3::from(self.along() * along - self.over * ring);
                 let along = NEARER
                     .map(|share| share * along)
@@ -488,7 +488,7 @@ impl Stage for EdgePattern {
     }
 }
 
-/// The plane at a place of F with these axes.
+/// Plane at a place of F with these axes.
 fn plane(context: &SearchContext, origin: Vector3<f64>, axes: [Vector3<f64>; 3]) -> Plane {
     let turn = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&axes));
     let in_f = Isometry3::from_parts(origin.into(), UnitQuaternion::from_rotation_matrix(&turn));

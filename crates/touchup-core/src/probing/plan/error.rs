@@ -1,4 +1,4 @@
-//! Why nothing was found.
+//! Why an exploration found nothing.
 
 use crate::features::fit::FitError;
 
@@ -10,15 +10,15 @@ pub enum ExploreError {
         "nothing within {radius_mm:.1} mm of the flag that a ball of {ball_mm:.1} mm goes into: flag it nearer, or take a smaller ball"
     )]
     NotFound {
-        /// mm
+        /// radius of the search, mm
         radius_mm: f64,
-        /// diameter, mm
+        /// diameter of the ball, mm
         ball_mm: f64,
     },
     /// The surface is the same all around.
     #[error("the surface does not end within {radius_mm:.1} mm of the flag: flag the edge nearer")]
     NoEdge {
-        /// mm
+        /// radius of the search, mm
         radius_mm: f64,
     },
     /// Too few walls.
@@ -26,21 +26,21 @@ pub enum ExploreError {
         "a wall was touched in only {walls} of {asked} directions: is it a {kind}, and no wider than {reach_mm:.0} mm?"
     )]
     NoWall {
-        /// the kind that was searched
+        /// kind of the feature
         kind: &'static str,
-        /// touched
+        /// touched walls
         walls: usize,
-        /// tried
+        /// tried directions
         asked: usize,
-        /// mm
+        /// reach of the search, mm
         reach_mm: f64,
     },
-    /// Nothing closes a slot.
+    /// A slot without an end.
     #[error(
         "an end of the slot was not touched in {searches} searches along it: is it open? Then probe its edges"
     )]
     NoEnd {
-        /// made towards it
+        /// searches towards the end
         searches: usize,
     },
     /// The ball touches the ground before the wall.
@@ -48,50 +48,50 @@ pub enum ExploreError {
         "the wall of the {kind} is {height_mm:.1} mm high, too low for a ball of {ball_mm:.1} mm: take a smaller one"
     )]
     TooLow {
-        /// the kind that was searched
+        /// kind of the feature
         kind: &'static str,
-        /// mm
+        /// height of the wall, mm
         height_mm: f64,
-        /// diameter, mm
+        /// diameter of the ball, mm
         ball_mm: f64,
     },
-    /// Contacts that the others leave out, and that agree among themselves.
+    /// Contacts that the fit leaves out, and that agree among themselves.
     #[error(
         "{misfits} of {of} contacts{since} lie together {how} the surface of the others, which no outliers do: it has a step there, or \
          probe or part moved between them; look, and flag nearer what is wanted",
         since = since.map(|touch| format!(", all from touch {touch} on,")).unwrap_or_default()
     )]
     TwoSurfaces {
-        /// that lie elsewhere
+        /// contacts off the surface
         misfits: usize,
-        /// of how many
+        /// all contacts
         of: usize,
-        /// how far off, and to which side
+        /// distance and side
         how: String,
-        /// the first of them, from 0 on, where they are the later ones
+        /// first of them, from 0 on, if they are the later ones
         since: Option<u32>,
     },
-    /// The touches are not of such a surface.
+    /// Touches of another surface than expected.
     #[error(transparent)]
     Fit(#[from] FitError),
-    /// More touches are needed.
+    /// Too few touches.
     #[error("{touches} touches are not enough: it is not measured yet; allow more")]
     NotDone {
-        /// made
+        /// touches made
         touches: usize,
     },
-    /// There is no pattern for it.
+    /// A kind without a pattern.
     #[error("a {kind} is not probed by itself: probe the edges that meet in it")]
     NoPattern {
-        /// what it is
+        /// name of the kind
         kind: &'static str,
     },
-    /// It has no such number.
+    /// A number that the kind does not have.
     #[error("a {kind} has no {number}: ask for another number, or for all")]
     NoSuchNumber {
-        /// what it is
+        /// name of the kind
         kind: &'static str,
-        /// as requested
+        /// requested number
         number: &'static str,
     },
 }

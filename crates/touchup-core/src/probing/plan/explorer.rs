@@ -1,4 +1,4 @@
-//! A flagged feature, explored touch by touch.
+//! Exploration of a flagged feature, touch by touch.
 
 use std::sync::Arc;
 
@@ -19,32 +19,31 @@ use crate::features::{Feature, Kind};
 use crate::mesh::TriMesh;
 use crate::numeric::turned_to;
 
-/// What was found.
+/// Result of an exploration.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Found {
-    /// what it is; `None` of an unknown region, which only the mesh describes
+    /// the feature; `None` for an unknown region, which only the mesh describes
     pub feature: Option<Feature>,
-    /// touches that were made, misses included
+    /// number of touches, misses included
     pub touches: usize,
     /// whether the number has the requested uncertainty
     pub is_as_asked: bool,
     /// standard uncertainty of the number, m or rad
     pub uncertainty: Option<f64>,
-    /// the part of it that all touches have in common: radius, place of the part, kinematics; m or
-    /// rad
+    /// its part common to all touches: radius, place of the part, kinematics; m or rad
     pub shared: f64,
-    /// where the touches have done what they can, and that part keeps the number from what was
-    /// asked for: uncertainty over the requested one
+    /// uncertainty over the requested one, if the touches are done and the common part keeps the
+    /// number from the request
     pub limited: Option<f64>,
-    /// the feature with the uncertainties that come from the scatter of its touches alone
+    /// feature with uncertainties from the scatter of its touches alone
     pub by_touches: Option<Feature>,
-    /// each characteristic that was to be decided, where that was the goal
+    /// each characteristic of a decision goal
     pub characteristics: Vec<DecidedCharacteristic>,
 }
 
 /// Explores one flagged feature. It moves nothing: [`Explorer::next_touch`] plans a touch,
-/// [`Explorer::take`] takes its result, from an arm or by hand. Nothing is planned beside the part,
-/// as the scan has it.
+/// [`Explorer::take`] takes its result, from an arm or by hand. No touch goes beside the part, as
+/// the scan has it.
 #[derive(Debug)]
 pub struct Explorer {
     context: SearchContext,
@@ -52,24 +51,24 @@ pub struct Explorer {
     asked: Option<TouchPlan>,
     ended: Option<Result<bool, ExploreError>>,
     kind: Option<Kind>,
-    /// requested of the number, m or rad
+    /// requested uncertainty of the number, m or rad
     wanted: f64,
-    /// m or rad
+    /// part common to all touches, m or rad
     shared: f64,
-    /// what is to be decided, and the rule of one look
+    /// decision goal, and the rule of one look
     goal: Option<(DecisionGoal, DecisionParams)>,
 }
 
-/// Where what touches leave is this share of what all of them have in common, more touches add a
-/// twentieth at most.
+/// Uncertainty by touches over the common uncertainty, below which more touches add a twentieth at
+/// most.
 const LEAST_SHARE: f64 = 1.0 / 3.0;
-/// Of two roots.
+/// Rounding of two roots.
 const ROUNDING: f64 = 1e-9;
 
 impl Explorer {
-    /// - `kind`: what it is; `None`: unknown. Pockets are explored as slots.
-    /// - `flag`: about where, on the surface, m in O; `normal`: about that of the surface there.
-    /// - `scan`: the part as far as it is known, in O.
+    /// - `kind`: of the feature; `None`: unknown. Pockets are explored as slots.
+    /// - `flag`: approximate place on the surface, m in O; `normal`: approximate normal there.
+    /// - `scan`: the known part, in O.
     ///
     /// # Errors
     /// [`ExploreError::NoPattern`], [`ExploreError::NoSuchNumber`].
@@ -100,7 +99,7 @@ impl Explorer {
         };
         let pose_of = Isometry3::from_parts(flag.coords.into(), turned_to(normal));
         let (shared, wanted) = (params.shared_part(kind, flag, normal), params.sigma);
-        // of the touches no more is asked than makes a difference
+        // request no more of the touches than makes a difference
         let sigma = (wanted.powi(2) - shared.powi(2))
             .max(0.0)
             .sqrt()
@@ -132,7 +131,7 @@ impl Explorer {
         })
     }
 
-    /// Touches until each characteristic of the feature is decided, in place of until a number has
+    /// Touches until each characteristic of the feature is decided, instead of until a number has
     /// an uncertainty.
     pub fn until_decided(mut self, goal: DecisionGoal) -> Self {
         let of_one_look = goal.of_one_look(self.context.params.budget);
@@ -141,12 +140,12 @@ impl Explorer {
         self
     }
 
-    /// What the touches so far say of each characteristic that is to be decided.
+    /// State of each characteristic of the decision goal after the touches.
     pub fn characteristics(&self) -> Vec<DecidedCharacteristic> {
         let Some((goal, params)) = &self.goal else {
             return Vec::new();
         };
-        // the shape is fixed where each of its numbers is
+        // the shape is fixed if each of its numbers is
         let of_all = SearchContext {
             open: None,
             ..self.context.clone()
@@ -163,7 +162,7 @@ impl Explorer {
         goal.standing(params, feature.as_ref().zip(by_touches.as_ref()))
     }
 
-    /// Whether nothing is left that touches are made for.
+    /// Whether nothing remains to touch for.
     fn is_done(&mut self) -> bool {
         let Some((_, params)) = self.goal.as_ref() else {
             return self.stage.is_known(&self.context);
@@ -174,19 +173,19 @@ impl Explorer {
         !standing.iter().any(DecidedCharacteristic::is_open)
     }
 
-    /// Touches so far.
+    /// Number of touches made.
     pub fn touches(&self) -> usize {
         self.context.touches
     }
 
-    /// Places of the surface, m in O, that would have been touched, but where the scan has no part.
+    /// Places of the surface, m in O, left out because the scan has no part there.
     pub fn left_out(&self) -> &[Point3<f64>] {
         &self.context.left_out
     }
 
-    /// Standard uncertainty of the wanted number now, m or rad; `None` while there is none.
+    /// Present standard uncertainty of the wanted number, m or rad; `None` while there is none.
     pub fn uncertainty(&self) -> Option<f64> {
-        // also where a decision asks for less
+        // also if a decision requests less
         let of_all = SearchContext {
             open: None,
             ..self.context.clone()
@@ -196,13 +195,13 @@ impl Explorer {
             .map(|sigma| sigma.hypot(self.shared))
     }
 
-    /// The next planned touch; `None` when it is done, or cannot be ([`Self::found`] says which).
+    /// Next planned touch; `None` after success or failure ([`Self::found`] says which).
     pub fn next_touch(&mut self) -> Option<TouchPlan> {
         self.asked = None;
         if self.ended.is_some() || self.context.touches >= self.context.params.budget {
             return None;
         }
-        // no more touches make outliers of contacts that agree
+        // further touches would make outliers of contacts that agree
         if let Err(error @ ExploreError::TwoSurfaces { .. }) = self.stage.feature(&self.context) {
             self.ended = Some(Err(error));
         }
@@ -222,7 +221,7 @@ impl Explorer {
         self.asked
     }
 
-    /// The scan says what would be met there: nothing.
+    /// Leaves out a touch: by the scan it would miss.
     fn leave_out(&mut self, planned: TouchPlan) {
         self.context.leave_out(&self.context.in_f(&planned.from));
         let (result, is_left_out) = (TouchResult::Nothing, true);
@@ -238,8 +237,8 @@ impl Explorer {
         );
     }
 
-    /// Paths on which the ball slides over the whole feature; none where nothing was found, or
-    /// where a ball has no room.
+    /// Paths of slides over the whole feature; none without a feature, or without room for the
+    /// ball.
     pub fn slides(&self) -> Vec<Slide> {
         if self.found().is_ok() {
             self.stage.slides(&self.context)
@@ -281,7 +280,7 @@ impl Explorer {
         );
     }
 
-    /// What was found, once [`Self::next_touch`] plans nothing more.
+    /// Result, once [`Self::next_touch`] plans nothing more.
     ///
     /// # Errors
     /// [`ExploreError`].
@@ -289,7 +288,7 @@ impl Explorer {
         let is_as_asked = match &self.ended {
             Some(Err(error)) => return Err(error.clone()),
             Some(Ok(is_as_asked)) => *is_as_asked,
-            // the last touch that may be made was enough
+            // the last allowed touch was enough
             None => {
                 self.context.touches >= self.context.params.budget
                     && self.stage.is_known(&self.context)

@@ -1,11 +1,11 @@
-//! A hole from one flag: found by what is missing, measured by its wall.
+//! A hole from one flag: found by a missing surface, measured by its wall.
 //!
-//! 1. Where the ball falls in ([`OpeningSearch`]).
-//! 2. Sideways from there in three directions: a first circle. Its middle is a better place to
-//!    touch from.
-//! 3. Down in the middle: how deep it is, and how deep the wall may be touched.
+//! 1. A place for the ball to fall in ([`OpeningSearch`]).
+//! 2. Sideways from there in three directions: a first circle. Its middle is a better start of
+//!    touches.
+//! 3. Down in the middle: the depth of the hole, and the deepest touch of the wall.
 //! 4. Down around the hole: the plane of its opening.
-//! 5. The wall where a touch has the largest gain, at two depths.
+//! 5. The wall by the largest gain of a touch, at two depths.
 
 use nalgebra::{Point3, Vector3};
 
@@ -34,9 +34,9 @@ pub(super) struct HolePattern {
     opening: OpeningSearch,
     wall: RoundWall,
     floor: Option<End>,
-    /// the ball's centre on it, m in O
+    /// the ball's centre on the floor, m in O
     on_floor: Option<Point3<f64>>,
-    /// how deep the wall may be touched, m
+    /// depth of the deepest touch of the wall, m
     depth: f64,
     first: usize,
     around: usize,

@@ -1,5 +1,4 @@
-//! The true pose of the surface around a flag: until it was touched, only the scan gives its
-//! normal.
+//! True pose of the surface around a flag: before touches only the scan gives its normal.
 
 use std::f64::consts::SQRT_2;
 
@@ -9,26 +8,25 @@ use super::search_context::SearchContext;
 use crate::features::fit::{FitParams, Observation, Plane, fit};
 use crate::numeric::{mean, scatter};
 
-/// Touches within this of a plane are of it, m.
+/// Maximum distance of a plane's touches from it, m.
 const OF_PLANE: f64 = 60e-6;
-/// Three touches determine a plane when the triangle between them is at least this high, over the
-/// ball's radius.
+/// Minimum height of the triangle of three touches that determine a plane, over the ball's radius.
 const SPREAD: f64 = 1.0;
 
-/// Standard deviation of the normal of the scan, in each of two directions, rad: near an edge that
-/// the scan has rounded it is off by 0.16.
+/// Standard deviation of the scan's normal, in each of two directions, rad: near an edge that the
+/// scan has rounded it is off by 0.16.
 pub(super) const UNTOUCHED: f64 = 0.1;
-/// What is not of the plane lies off it by this many standard deviations.
+/// Minimum distance of other touches from a plane, in standard deviations.
 const GATE: f64 = 4.0;
-/// The normal of the scan is not wrong by more than this (cosine): 25°.
+/// Cosine of the maximum error of the scan's normal: 25°.
 const ALIKE: f64 = 0.9;
 
 impl SearchContext {
-    /// Turns and lifts the frame so that its z = 0 is the plane that most touches lie on; whether
+    /// Turns and lifts the frame so that its z = 0 is the plane of most touches; returns whether
     /// there is one.
     ///
-    /// - `is_top`: none may lie above it.
-    /// - `places`: of the frame as it was, in its plane of the surface: they stay where they are.
+    /// - `is_top`: no touch may lie above it.
+    /// - `places`: in the frame as it was, in its plane of the surface; they stay in place.
     pub fn level(
         &mut self,
         observations: &mut Vec<Observation>,
@@ -44,7 +42,7 @@ impl SearchContext {
         let turn = UnitQuaternion::rotation_between(&self.out(), &normal)
             .unwrap_or_else(UnitQuaternion::identity);
         let rotation = turn * before.rotation;
-        // the flag as it is seen along the normal
+        // the flag, seen along the normal
         let flag = Point3::from(before.translation.vector);
         let ball = self.params.ball_radius;
         let origin = flag + normal.into_inner() * ((mean - flag).dot(&normal) - ball);
@@ -62,9 +60,9 @@ impl SearchContext {
         true
     }
 
-    /// Normal of the plane that most touches lie on, and those touches: of the planes through three
-    /// of them the one with the least truncated squares \[Torr Zisserman 2000, MSAC\], where the
-    /// normal of the scan counts as one more observation.
+    /// Normal of the plane of most touches, and these touches: of the planes through three of them,
+    /// it has the least truncated squares \[Torr Zisserman 2000, MSAC\], with the normal of the
+    /// scan as one more observation.
     fn most_plane(
         &self,
         observations: &[Observation],
@@ -86,7 +84,7 @@ impl SearchContext {
                     let off = |o: &Observation| (o.point - a.point).dot(&normal);
                     let is_allowed = !is_top || observations.iter().all(|o| off(o) < of_plane);
                     let alike = normal.dot(&self.out());
-                    // −ln of the probability, without what is the same for all
+                    // −ln of the probability, without constants
                     let of_touch =
                         |o: &Observation| (off(o) / of_plane).powi(2).min(1.0) * GATE.powi(2) / 2.0;
                     let turned = alike.clamp(-1.0, 1.0).acos() / UNTOUCHED;

@@ -1,4 +1,4 @@
-//! The contacts of one surface, and the next touch of it with the largest gain.
+//! Contacts of one surface, and its next touch by the largest gain.
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
@@ -10,21 +10,21 @@ use super::search_context::{
 };
 use crate::features::fit::{Fit, FitParams, Freedom, Observation, Plane, Surface, fit};
 
-/// A candidate touch: where the surface would be touched, and how.
+/// A candidate touch: its place on the surface, and its plan.
 pub(super) struct Possible {
-    /// on the surface, m in O
+    /// place on the surface, m in O
     pub point: Point3<f64>,
-    /// with the ball's centre so far from where the search begins, m
+    /// travel of the ball's centre from the start of the search, m
     pub travel: f64,
     pub planned: TouchPlan,
 }
 
-/// The scan has to have a part so far behind a wall that is touched, m.
+/// Depth behind a touched wall at which the scan has to have a part, m.
 const BEHIND: f64 = 0.3e-3;
 
 impl SearchContext {
-    /// Those of the candidates that the scan has a part for: all around a touch from above, behind
-    /// a wall that is touched.
+    /// Candidates for which the scan has a part: all around a touch from above, behind a touched
+    /// wall.
     pub fn on_part(&self, possible: impl IntoIterator<Item = Possible>) -> Vec<Possible> {
         let is_part = |p: &Possible| {
             let (behind, radius) = if self.is_down(&p.planned) {
@@ -41,21 +41,21 @@ impl SearchContext {
     }
 }
 
-/// What is wanted of a surface, and what is believed of it before it is touched.
+/// Request for a surface, and prior of it before any touch.
 pub(super) struct Wanted {
     pub before: Knowledge,
     pub asked: Asked,
     pub fit: FitParams,
-    /// so many touches before it is believed
+    /// minimum number of touches for a credible surface
     pub least: usize,
     pub params: PatternParams,
 }
 
 impl Wanted {
-    /// What is wanted of a plane.
+    /// Request for a plane.
     ///
-    /// - `leans`: those that count, as far as `reach` from its middle, m; `most`: what leans more
-    ///   is another surface, rad.
+    /// - `leans`: leans that count, as far as `reach` from its middle, m; `most`: lean above which
+    ///   it is another surface, rad.
     pub fn of_plane(
         params: &PatternParams,
         leans: &[Freedom],
@@ -82,14 +82,14 @@ impl Wanted {
         }
     }
 
-    /// The covariance of a surface after touches of it.
+    /// Covariance of a surface after its touches.
     fn known<'a, M: Surface>(
         &self,
         surface: &M,
         touches: impl Iterator<Item = &'a Observation>,
     ) -> Knowledge {
         touches.fold(self.before.clone(), |known, o| {
-            // the ball's centre lies on the same normal as the place that it touches
+            // the ball's centre lies on the same normal as its contact
             known.with(
                 surface,
                 &Candidate {
@@ -105,24 +105,24 @@ impl Wanted {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Measuring {
     pub observations: Vec<Observation>,
-    /// places without contact, or without a clear one
+    /// places without a contact, or without a clear one
     dead: Vec<Point3<f64>>,
     aimed: Option<Point3<f64>>,
 }
 
-/// Share of the touches that may lie elsewhere than on the surface.
+/// Maximum share of touches off the surface.
 const MOST_REFUSED: f64 = 0.2;
-/// Misfits agree where so many more of them than it takes to say how they are off do so …
+/// Misfits beyond the unknowns of their displacement, for an agreement.
 const AGREEING: usize = 2;
-/// … within so many of their standard deviations.
+/// Distance of misfits that agree, in their standard deviations.
 const WITHIN: f64 = 2.0;
-/// A direction that misfits determine has this share of their normals at least.
+/// Minimum share of the misfits' normals in a direction that they determine.
 const SHARE: f64 = 0.2;
-/// Places nearer than this to one without contact are not tried, m.
+/// Radius around a place without contact in which no touch follows, m.
 const DEAD: f64 = 0.2e-3;
 
 impl Measuring {
-    /// Takes a touch that was aimed at this surface.
+    /// Takes a touch that aimed at this surface.
     pub fn take(&mut self, touch: &Touched) {
         let aimed = self.aimed.take();
         match (touch.result, aimed) {
@@ -132,7 +132,7 @@ impl Measuring {
         }
     }
 
-    /// A contact where none should be belongs to another surface.
+    /// Refuses the last contact, which belongs to another surface.
     pub fn refuse_last(&mut self, touch: &Touched) {
         if self.observations.last() == touch.observation.as_ref()
             && self.observations.pop().is_some()
@@ -141,12 +141,12 @@ impl Measuring {
         }
     }
 
-    /// The largest standard uncertainty of the requested numbers, m or rad by the requested one of
-    /// each, as far as the touches support it: of those that lie on one surface, and stretched
-    /// where they differ from it beyond what they say of themselves.
+    /// Largest standard uncertainty of the requested numbers, m or rad in proportion to the
+    /// requested one of each, by the touches on one surface, and stretched if they differ from it
+    /// beyond their own uncertainty.
     ///
-    /// `None` where there are too few, where they do not fix a number, or where more than
-    /// [`MOST_REFUSED`] of them lie elsewhere.
+    /// `None` for too few touches, for touches that do not fix a number, or for more than
+    /// [`MOST_REFUSED`] of them off the surface.
     pub fn uncertainty<M: Surface>(&self, guess: &M, wanted: &Wanted) -> Option<f64> {
         if self.observations.len() < wanted.least {
             return None;
@@ -174,17 +174,17 @@ impl Measuring {
         )
     }
 
-    /// The surface through the contacts.
+    /// Surface through the contacts.
     ///
     /// # Errors
-    /// [`ExploreError::TwoSurfaces`] where those that it leaves out agree; as [`fit`].
+    /// [`ExploreError::TwoSurfaces`] if the contacts that it leaves out agree; as [`fit`].
     pub fn fitted<M: Surface>(
         &self,
         guess: &M,
         params: &FitParams,
     ) -> Result<Fit<M>, ExploreError> {
         let found = fit(guess, &self.observations, params)?;
-        // walls that lean more than is believed are no second surface
+        // walls that lean more than expected are no second surface
         let leaning = FitParams {
             axis_sigma: None,
             ..*params
@@ -195,7 +195,7 @@ impl Measuring {
         }
     }
 
-    /// What is wrong where the contacts that a fit leaves out are off its surface alike.
+    /// Error for contacts that a fit leaves out, if they are off its surface alike.
     fn agreeing<M: Surface>(&self, fit: &Fit<M>) -> Option<ExploreError> {
         let off: Vec<_> = self
             .observations
@@ -223,7 +223,7 @@ impl Measuring {
         })
     }
 
-    /// The touch with the largest gain for the requested numbers, and its gain.
+    /// Touch with the largest gain for the requested numbers, and its gain.
     pub fn best<M: Surface>(
         &self,
         surface: &M,
@@ -246,7 +246,7 @@ impl Measuring {
         Some((chosen, gain))
     }
 
-    /// The planned touch with the largest gain.
+    /// Plan of the touch with the largest gain.
     pub fn next<M: Surface>(
         &mut self,
         surface: &M,
@@ -257,17 +257,17 @@ impl Measuring {
             .map(|(best, _)| self.aim(&best))
     }
 
-    /// The planned touch is one of this surface.
+    /// Plans a touch of this surface.
     pub fn aim(&mut self, possible: &Possible) -> TouchPlan {
         self.aimed = Some(possible.point);
         possible.planned
     }
 }
 
-/// How contacts are off a surface together: all by as much along its normals, or as it would be
-/// displaced; `None` where they are not.
+/// Common offset of contacts from a surface: equal along its normals, or by one displacement of it;
+/// `None` without agreement.
 ///
-/// - `off`: of each, m; the normal there, in O, and its standard deviation, m.
+/// - `off`: offset of each, m; the normal there, in O, and its standard deviation, m.
 fn lying_together(off: &[(f64, Vector3<f64>, f64)]) -> Option<String> {
     let mean = off.iter().map(|(off, ..)| off).sum::<f64>() / off.len() as f64;
     let is_mean = |(off, _, sigma): &(f64, Vector3<f64>, f64)| (off - mean).abs() <= WITHIN * sigma;
@@ -278,7 +278,7 @@ fn lying_together(off: &[(f64, Vector3<f64>, f64)]) -> Option<String> {
     let normals = off.iter().map(|(_, n, _)| n * n.transpose());
     let parts = normals.sum::<Matrix3<f64>>().symmetric_eigen();
     let pulls = off.iter().map(|(off, n, _)| n * *off).sum::<Vector3<f64>>();
-    // a direction that hardly any of them has is not theirs to say
+    // few normals in a direction do not determine it
     let is_theirs = |axis: &usize| parts.eigenvalues[*axis] > SHARE * off.len() as f64;
     let axes: Vec<_> = (0..3).filter(is_theirs).collect();
     let by: Vector3<f64> = axes

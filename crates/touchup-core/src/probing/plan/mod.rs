@@ -1,9 +1,8 @@
-//! Where to touch next.
+//! Choice of the next touch.
 //!
 //! [`Knowledge`] is the covariance of a surface after its touches, and predicts the gain of one
-//! more: the next touch goes where it reduces the uncertainty of the requested number most.
-//! [`Explorer`] finds a feature from a flag and measures it so; a [`Slide`] leads over the whole of
-//! what was found, for the mesh.
+//! more: the next touch reduces the uncertainty of the requested number most. [`Explorer`] finds a
+//! feature from a flag and measures it this way; a [`Slide`] covers all of it, for the mesh.
 
 mod advice;
 mod arm_uncertainty;

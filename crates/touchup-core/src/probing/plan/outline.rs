@@ -1,37 +1,36 @@
-//! Where the scan has a part at all, seen along the normal at a flag: touches are planned nowhere
-//! else.
+//! Outline of the part in a scan, seen along the normal at a flag: no touch goes beyond it.
 
 use nalgebra::{Isometry3, Point2, Point3, Unit, Vector2, Vector3};
 
 use crate::mesh::TriMesh;
 use crate::numeric::turned_to;
 
-/// The outline of a scan, seen along the normal at a flag. An opening that the part encloses counts
-/// as part: a hole is no less searched where the scan shows it, or has nothing there.
+/// Outline of a scan, seen along the normal at a flag. An opening that the part encloses counts as
+/// part: the search for a hole is the same whether the scan shows it or has nothing there.
 ///
-/// Only what lies no deeper below the flag than touches reach counts: not the table under a part.
+/// Only the scan within reach of touches below the flag counts: not the table under a part.
 #[derive(Clone, Debug)]
 pub struct Outline {
     /// maps O to the frame of the flag
     pose_fo: Isometry3<f64>,
-    /// of the first cell, m
+    /// low corner of the first cell, m
     lowest: Point2<f64>,
     /// side of a cell, m
     cell: f64,
     columns: usize,
-    /// row after row; with one row and one column of them around all of the scan
+    /// row after row; with a margin of one row and one column around the scan
     is_outside: Vec<bool>,
 }
 
-/// Side of a cell, m, of a scan that is not too large for it …
+/// Minimum side of a cell, m.
 const CELL: f64 = 0.2e-3;
-/// … for which no side of it has more cells than this.
+/// Maximum number of cells along one side of a scan.
 const MOST: f64 = 1024.0;
-/// Places around a place that are looked at.
+/// Tested places around a place.
 const AROUND: usize = 12;
 
 impl Outline {
-    /// - `scan`: in O; `flag`, `normal`: in O; `deep`: how far below the flag touches reach, m.
+    /// - `scan`: in O; `flag`, `normal`: in O; `deep`: reach of touches below the flag, m.
     pub fn new(scan: &TriMesh, flag: &Point3<f64>, normal: &Unit<Vector3<f64>>, deep: f64) -> Self {
         let pose_fo = Isometry3::from_parts(flag.coords.into(), turned_to(normal)).inverse();
         let triangles = || {
@@ -77,7 +76,7 @@ impl Outline {
         !is_in || self.is_outside[at.y as usize * self.columns + at.x as usize]
     }
 
-    /// Whether all within a radius (m) of a place of O is over or under the part.
+    /// Whether the disc of a radius (m) about a place of O is all over or under the part.
     pub fn is_part(&self, place: &Point3<f64>, radius: f64) -> bool {
         let place = (self.pose_fo * place).xy();
         let turn = |at: usize| at as f64 / AROUND as f64 * std::f64::consts::TAU;
@@ -89,13 +88,12 @@ impl Outline {
     }
 }
 
-/// The cells whose middle a triangle covers, seen from above; column and row. The corners are in
-/// cells.
+/// Cells whose middle a triangle covers, seen from above; column and row. The corners are in cells.
 fn cover(corners: [Vector2<f64>; 3], mut found: impl FnMut(usize, usize)) {
     let [a, b, c] = corners;
     let area = (b - a).perp(&(c - a));
     let [low, high] = [a.inf(&b).inf(&c), a.sup(&b).sup(&c)];
-    // their middles are half a cell beside their numbers
+    // middles of cells are half a cell beside their numbers
     let from = |low: f64| (low - 0.5).ceil().max(0.0) as usize;
     let to = |high: f64| (high - 0.5).floor();
     let turned = if area < 0.0 { -1.0 } else { 1.0 };
@@ -111,10 +109,10 @@ fn cover(corners: [Vector2<f64>; 3], mut found: impl FnMut(usize, usize)) {
     }
 }
 
-/// A middle on the edge of a triangle is covered, in spite of rounding; in cells.
+/// Tolerance for a middle on the edge of a triangle, against rounding; in cells.
 const INCLUDED: f64 = 1e-9;
 
-/// The empty cells that are joined with the border of the grid by empty cells, side by side.
+/// Empty cells joined with the border of the grid by empty cells, side by side.
 fn reached_from_border(is_part: &[bool], columns: usize) -> Vec<bool> {
     // the border is empty, and so is the first cell
     let mut is_reached = vec![false; is_part.len()];
@@ -142,8 +140,8 @@ fn reached_from_border(is_part: &[bool], columns: usize) -> Vec<bool> {
 mod tests {
     use super::*;
 
-    /// A frame of 20 × 20 mm around an opening of 8 × 8 mm, in z = 0, that is open towards +x where
-    /// asked; by hand.
+    /// A frame of 20 × 20 mm around an opening of 8 × 8 mm, in z = 0, open towards +x on request;
+    /// by hand.
     fn frame(is_open: bool) -> TriMesh {
         let (mut positions, mut faces) = (Vec::new(), Vec::new());
         let mut block = |x: [f64; 2], y: [f64; 2]| {
@@ -183,7 +181,7 @@ mod tests {
         }
     }
 
-    /// A table 6 mm below the flag, of 100 × 100 mm, is deeper than touches reach.
+    /// A table of 100 × 100 mm, 6 mm below the flag, is deeper than the reach of touches.
     #[test]
     fn what_is_deeper_than_touches_reach_is_no_part() {
         let table = [[-50.0, -50.0], [50.0, -50.0], [50.0, 50.0], [-50.0, 50.0]];

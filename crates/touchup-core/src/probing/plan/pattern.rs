@@ -1,5 +1,5 @@
-//! What all kinds of features have in common when they are explored: a stage plans a touch and
-//! takes its result.
+//! Interface common to all kinds of features under exploration: a stage plans a touch and takes its
+//! result.
 
 use std::fmt::Debug;
 
@@ -11,42 +11,42 @@ use super::slide::Slide;
 use crate::features::Feature;
 use crate::features::fit::Observation;
 
-/// A touch and its result, as a stage takes it.
+/// A touch and its result, as a stage takes them.
 pub(super) struct Touched {
     pub planned: TouchPlan,
     pub result: TouchResult,
-    /// whether it was not made, for the scan has no part there: then as if nothing was met
+    /// whether the touch was left out, as the scan has no part there: then it counts as a miss
     pub is_left_out: bool,
-    /// centre of the ball in F, where it was stopped
+    /// centre of the ball in F at its stop
     pub place: Option<Point3<f64>>,
     pub observation: Option<Observation>,
 }
 
-/// One kind of feature, being explored.
+/// Exploration of one kind of feature.
 pub(super) trait Stage: Debug + Send {
-    /// The next planned touch; `None` when no touch can improve it.
+    /// Next planned touch; `None` if no touch can improve the feature.
     ///
     /// # Errors
-    /// [`ExploreError`] when there is no such feature.
+    /// [`ExploreError`] if there is no such feature.
     fn next(&mut self, context: &mut SearchContext) -> Result<Option<TouchPlan>, ExploreError>;
     /// Takes the result of the touch.
     fn take(&mut self, context: &mut SearchContext, touch: &Touched);
-    /// The feature, as far as it is known.
+    /// The feature by the touches made.
     ///
     /// # Errors
-    /// [`ExploreError`]; [`ExploreError::NotDone`] before it can be.
+    /// [`ExploreError`]; [`ExploreError::NotDone`] before that is possible.
     fn feature(&self, context: &SearchContext) -> Result<Option<Feature>, ExploreError>;
-    /// Standard uncertainty of the number now, m or rad.
+    /// Present standard uncertainty of the number, m or rad.
     fn uncertainty(&self, context: &SearchContext) -> Option<f64>;
-    /// Whether it has the requested uncertainty.
+    /// Whether the number has the requested uncertainty.
     fn is_known(&self, context: &SearchContext) -> bool {
         self.uncertainty(context)
             .is_some_and(|sigma| sigma <= context.params.sigma)
     }
-    /// Whether its touches fix its shape, so that its numbers can be believed.
+    /// Whether the touches fix the shape, so that its numbers are credible.
     fn is_fixed(&self, context: &SearchContext) -> bool {
         self.uncertainty(context).is_some()
     }
-    /// Paths to slide over it, once there is a feature.
+    /// Paths of slides over the feature, if there is one.
     fn slides(&self, context: &SearchContext) -> Vec<Slide>;
 }

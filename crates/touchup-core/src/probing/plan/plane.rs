@@ -1,4 +1,4 @@
-//! A plane: a first triangle, then where a touch has the largest gain for its place or its normal.
+//! A plane: a first triangle, then touches by the largest gain for its place or its normal.
 
 use nalgebra::Point3;
 
@@ -13,17 +13,17 @@ use super::slide::Slide;
 use crate::features::Feature;
 use crate::features::fit::{FitParams, Freedom, Observation, Plane};
 
-/// Places across the field that are candidates.
+/// Candidate places across the field.
 const ACROSS: f64 = 6.0;
-/// So many touches before it is believed.
+/// Minimum number of touches for a credible plane.
 const LEAST: usize = 6;
-/// What leans more is another surface, rad.
+/// Lean above which it is another surface, rad.
 const LEAN: f64 = 0.2;
 
 #[derive(Clone, Debug)]
 pub(super) struct PlanePattern {
     measuring: Measuring,
-    /// where it can be touched, in F
+    /// candidate places, in F
     places: Vec<Point3<f64>>,
     first: usize,
 }
@@ -48,7 +48,7 @@ impl PlanePattern {
     }
 
     fn wanted(params: &PatternParams) -> Wanted {
-        // at the rim of the field it is to be known as well as in its middle
+        // equally certain at the rim of the field and in its middle
         Wanted::of_plane(
             params,
             &[Freedom::TiltX, Freedom::TiltY],
@@ -71,7 +71,7 @@ impl PlanePattern {
             planned: context.down(place, search),
         };
         let possible = |places: Vec<&Point3<f64>>| context.on_part(places.into_iter().map(at));
-        // three places fit any plane: only others show a step
+        // three places fit any plane: only more show a step
         let touched = &self.measuring.observations;
         let is_new = |place: &&Point3<f64>| {
             let far = |contact: &Observation| (context.in_f(&contact.point) - **place).xy().norm();

@@ -1,4 +1,4 @@
-//! A region of unknown kind: touched in a spiral from the flag outward, for the mesh alone.
+//! A region of unknown kind: touches in a spiral from the flag outward, for the mesh alone.
 
 use nalgebra::Point3;
 
@@ -11,24 +11,24 @@ use crate::features::Feature;
 
 #[derive(Clone, Debug)]
 pub(super) struct RegionPattern {
-    /// in F, the next one last
+    /// places in F, the next one last
     places: Vec<Point3<f64>>,
-    /// the surface at those that were touched, in F; `None` at a miss
+    /// surface at the touched places, in F; `None` at a miss
     surface: Vec<Option<Point3<f64>>>,
-    /// from one to the next, m
+    /// distance of neighbours, m
     step: f64,
 }
 
-/// From place to place of the spiral the ball slides where they are no farther apart than this,
-/// over their step: across the surface, and up or down.
+/// Maximum distance of two places of the spiral with a slide between them, over their step: across
+/// the surface, and up or down.
 const NEXT: f64 = 1.5;
 const STEEP: f64 = 0.6;
 
 impl RegionPattern {
-    /// As dense as the budget allows.
+    /// Places as dense as the budget allows.
     pub fn new(params: &PatternParams) -> Self {
         let area = std::f64::consts::PI * params.flag_radius.powi(2);
-        // each place of a hexagonal grid has √3/2 of the square of its step
+        // a place of a hexagonal grid has √3/2 of its step squared
         let step = (area / params.budget.max(1) as f64 / 0.75f64.sqrt()).sqrt();
         let mut places = hexagonal(step, params.flag_radius);
         let ring = |p: &Point3<f64>| (p.coords.norm() / step).round();
@@ -68,7 +68,7 @@ impl Stage for RegionPattern {
                 .map(|place| Point3::new(place.x, place.y, context.below(&place))),
         );
         if let Some(place) = touch.place {
-            // the next one begins clear of the highest
+            // the next touch begins clear of the highest place
             context.height = context.height.max(context.below(&place));
         }
     }

@@ -1,7 +1,7 @@
-//! Where a ball falls in, near a flag that says little more than "about here".
+//! Search for an opening near a flag that says little more than "about here".
 //!
-//! Down from above at the flag, then around it, next to where the ball sank deepest: a ball on a
-//! rim sinks, so the path leads towards the opening.
+//! Down from above at the flag, then around it, next to the deepest position of the ball: a ball on
+//! a rim sinks, so the path leads towards the opening.
 
 use nalgebra::Point3;
 
@@ -10,51 +10,48 @@ use super::pattern::Touched;
 use super::search_context::{PatternParams, SearchContext, TouchPlan, TouchResult};
 use crate::features::fit::Observation;
 
-/// Distance of the places of the search, over the ball's radius: the ball falls into a hole of 2.2
-/// radii at least.
+/// Spacing of the search, over the ball's radius: the ball falls into a hole of 2.2 radii at least.
 const STEP: f64 = 1.0;
-/// So deep below the surface a ball is in, over its radius: the whole ball and a chamfer.
+/// Depth of a ball in an opening, over its radius: the whole ball and a chamfer.
 pub(super) const SHALLOW: f64 = 1.6;
-/// A ball that is this much lower than the surface sinks into something, m.
+/// Depth below the surface from which on a ball sinks into something, m.
 const SUNK: f64 = 50e-6;
-/// Touches within this of the highest are of one surface, m.
+/// Maximum depth of touches on one surface below the highest, m.
 const FLAT: f64 = 30e-6;
-/// What the scan says of the height may be off by this, m.
+/// Maximum error of the scan's height, m.
 pub(super) const ROUGH: f64 = 1.5e-3;
 
-/// Touches from above reach this far below the surface at most, over the ball's radius.
+/// Maximum reach of touches from above below the surface, over the ball's radius.
 pub(super) const DEEPEST: f64 = 5.0;
 
-/// The wall of an opening is searched this far, m.
+/// Length of a search for the wall of an opening, m.
 pub(super) const REACH: f64 = 12e-3;
-/// They are this far beyond the wall, over the ball's radius.
+/// Distance of touches of the surface beyond the wall, over the ball's radius.
 pub(super) const BESIDE: f64 = 1.3;
-/// So far beyond the wall the surface is no rim any more, m.
+/// Distance beyond the wall from which on the surface is no rim any more, m.
 pub(super) const CHAMFER: f64 = 0.5e-3;
-/// The ball stays this far above the floor, m.
+/// Distance of the ball above the floor, m.
 const OFF_FLOOR: f64 = 0.3e-3;
-/// The wall of an opening is touched this deep at the least, over the ball's radius: below a rim
-/// that is broken by no more, and as near to the opening as it may be, as the numbers refer to that
-/// place.
+/// Minimum depth of touches on the wall of an opening, over the ball's radius: below a rim broken
+/// by no more, and as near as possible to the opening, to which the numbers refer.
 pub(super) const BELOW_RIM: f64 = 0.7;
-/// A wall that may be touched no deeper than this, over the ball's radius, is too low.
+/// Maximum depth of touches, over the ball's radius, for which a wall is too low.
 const TOO_LOW: f64 = 0.2;
-/// Else it is touched no higher than this share of how deep it may be.
+/// Maximum depth of the highest touch of a wall, over its deepest touch.
 const HIGH: f64 = 0.6;
 
 impl SearchContext {
-    /// How far below the surface a wall may be touched, with the floor of its opening at a place of
-    /// the ball's centre, m.
+    /// Depth of the deepest touch of a wall below the surface, for a centre of the ball on the
+    /// floor of its opening, m.
     pub fn above_floor(&self, depth: f64, centre: &Point3<f64>) -> f64 {
         depth
             .min(self.height - centre.z - OFF_FLOOR)
             .max(BELOW_RIM * self.params.ball_radius)
     }
 
-    /// How far below the surface a wall may be touched that stands on the ground, m; at the highest
-    /// and the deepest.
+    /// Depths of touches of a wall on the ground below the surface, m: highest and deepest.
     ///
-    /// - `off`: the ball stays this far above the ground, m.
+    /// - `off`: distance of the ball above the ground, m.
     ///
     /// # Errors
     /// [`ExploreError::TooLow`].
@@ -78,12 +75,12 @@ impl SearchContext {
     }
 }
 
-/// Searches for an opening.
+/// Search for an opening.
 #[derive(Clone, Debug, Default)]
 pub(super) struct OpeningSearch {
-    /// places that were tried from above in F, and how deep the ball came
+    /// places tried from above in F, and depth of the ball there
     tried: Vec<(Point3<f64>, f64)>,
-    /// of the surface
+    /// contacts of the surface
     pub top: Vec<Observation>,
 }
 
@@ -95,18 +92,18 @@ impl OpeningSearch {
         }
     }
 
-    /// Radius of the search around the flag, m: no farther than all touches lead, each a step from
+    /// Radius of the search around the flag, m: within the travel of all touches, each a step from
     /// the last.
     fn farthest(params: &PatternParams) -> f64 {
         let step = STEP * params.ball_radius;
         (params.flag_radius + step).min(step * params.budget as f64)
     }
 
-    /// The next place of the search: the one not tried yet that is nearest to where the ball sank
-    /// deepest, and to the flag.
+    /// Next place of the search: the untried place nearest to the deepest position of the ball, and
+    /// to the flag.
     ///
     /// # Errors
-    /// [`ExploreError::NotFound`] when all have been tried.
+    /// [`ExploreError::NotFound`] after all places.
     pub fn next(&mut self, context: &mut SearchContext) -> Result<TouchPlan, ExploreError> {
         let PatternParams {
             ball_radius,
@@ -144,7 +141,7 @@ impl OpeningSearch {
         }
     }
 
-    /// Takes a touch; the place where the ball fell in, if it did.
+    /// Takes a touch; returns its place if the ball fell in.
     pub fn take(&mut self, context: &mut SearchContext, touch: &Touched) -> Option<Point3<f64>> {
         let wanted = context.in_f(&touch.planned.from);
         let wanted = Point3::new(wanted.x, wanted.y, 0.0);
@@ -152,7 +149,7 @@ impl OpeningSearch {
             (TouchResult::Nothing, ..) if !touch.is_left_out => return Some(wanted),
             (_, Some(place), Some(observation)) => {
                 let surface = context.below(&place);
-                // the highest is the surface; what is lower is a rim, or lower ground
+                // the highest is the surface; lower places are a rim, or lower ground
                 if self.tried.is_empty() || surface > context.height + context.params.beyond(SUNK) {
                     let lower = surface - context.height;
                     self.tried.iter_mut().for_each(|(_, depth)| *depth += lower);
@@ -170,8 +167,8 @@ impl OpeningSearch {
         None
     }
 
-    /// The ball slid in over a rim, and cannot be let down there again: the search goes on beside
-    /// it.
+    /// Marks a place at which the ball slid in over a rim and cannot go down again: the search goes
+    /// on beside it.
     pub fn slid_in(&mut self, place: Point3<f64>, context: &SearchContext) {
         self.tried.push((place, 2.0 * context.params.ball_radius));
     }
@@ -186,8 +183,7 @@ impl OpeningSearch {
         }
     }
 
-    /// Of the touches from above only those count where the ball lay on the surface, and not on the
-    /// rim.
+    /// Keeps of the touches from above only those on the surface, not on the rim.
     pub fn forget(&mut self, is_on_rim: impl Fn(&Point3<f64>) -> bool, context: &SearchContext) {
         self.top.retain(|o| !is_on_rim(&context.in_f(&o.point)));
     }
@@ -211,8 +207,8 @@ pub(super) fn hexagonal(step: f64, radius: f64) -> Vec<Point3<f64>> {
 mod tests {
     use super::*;
 
-    /// A hexagonal grid has 2π/√3 (R/s)² places within R: with 39 touches within 39 steps that is
-    /// 5518, and 1.6 million within 1 m.
+    /// A hexagonal grid has 2π/√3 (R/s)² places within R: 5518 for 39 touches within 39 steps, and
+    /// 1.6 million within 1 m.
     #[test]
     fn a_flag_that_may_be_a_metre_off_makes_no_millions_of_places() {
         let params = PatternParams {

@@ -1,4 +1,4 @@
-//! The request of a search, the touches that it plans, their results, and the frame of the search.
+//! Request of a search, its planned touches, their results, and its frame.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -12,13 +12,13 @@ use crate::features::{End, Kind};
 use crate::{names, parameters};
 
 parameters! {
-    /// What is known and wanted of a flagged feature.
+    /// Known and requested data of a flagged feature.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct PatternParams in "robot" {
-        /// Of the ball, m.
+        /// Radius of the ball, m.
         ball_radius: f64 = 1.5e-3;
-        /// The flag is off by no more than this, m; of a plane or an unknown region: so far around
-        /// the flag is touched.
+        /// Maximum error of the flag, m; for a plane or an unknown region, radius of the touched
+        /// field.
         flag_radius: f64 = 3e-3;
         /// Distance of the ball from the surface where a search begins.
         ///
@@ -28,9 +28,9 @@ parameters! {
         ///
         /// In m.
         depth: f64 = 5.0, "depth_mm" [MM, 0, 100];
-        /// The number that touches are chosen for.
+        /// Number that the touches serve.
         quantity: Quantity = Quantity::All;
-        /// Wanted standard deviation of it, m, or rad of an axis.
+        /// Requested standard deviation of this number, m, or rad of an axis.
         sigma: f64 = 4e-6;
         /// Touches of a feature at most.
         budget: usize = 39, "touches" [TOUCHES, 1, 1e4];
@@ -48,7 +48,7 @@ parameters! {
         square: f64 = 0.13, "square_sigma_deg" [DEG, 1e-3, 20];
     }
     with {
-        /// What all touches have in common.
+        /// Uncertainty common to all touches.
         shared: ArmUncertainty,
     }
 }
@@ -60,15 +60,15 @@ names! {
         /// place and sizes: every length
         #[default]
         All = "every length",
-        /// where it is
+        /// place of the feature
         Position = "position",
-        /// the direction of its axis, of an edge its line, of a plane its normal; rad
+        /// direction of its axis, of an edge its line, of a plane its normal; rad
         Axis = "axis",
-        /// of a hole or boss
+        /// diameter of a hole or boss
         Diameter = "diameter",
-        /// of a slot
+        /// length of a slot
         Length = "length",
-        /// of a slot
+        /// width of a slot
         Width = "width",
     }
 }
@@ -85,12 +85,12 @@ impl Quantity {
     }
 }
 
-/// Touches of one surface differ by no more than so many standard deviations: the difference of two
-/// by 4 of its own.
+/// Maximum difference of touches of one surface, in standard deviations: of two touches by 4 of its
+/// own.
 const BEYOND: f64 = 5.7;
 
 impl PatternParams {
-    /// The part of the wanted number of a feature that no touch reduces: the largest of its
+    /// Part of the wanted number's uncertainty that no touch reduces: the largest of the feature's
     /// numbers; m, or rad of an axis.
     ///
     /// - `out`: of the surface, unit vector.
@@ -113,9 +113,9 @@ impl PatternParams {
         }
     }
 
-    /// A difference of heights that is no scatter of touches, m.
+    /// Least difference of heights beyond the scatter of touches, m.
     ///
-    /// - `least`: what it is for an arm without scatter, m.
+    /// - `least`: for an arm without scatter, m.
     pub(super) fn beyond(&self, least: f64) -> f64 {
         least.max(BEYOND * self.touch_sigma)
     }
@@ -124,40 +124,40 @@ impl PatternParams {
 /// A planned touch, in O.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TouchPlan {
-    /// Above the part: from here the path to `from` is straight and free.
+    /// Place above the part: the path from here to `from` is straight and free.
     pub entry: Point3<f64>,
-    /// Centre of the ball where the search begins.
+    /// Centre of the ball at the start of the search.
     pub from: Point3<f64>,
-    /// Along which it is searched.
+    /// Direction of the search.
     pub direction: Unit<Vector3<f64>>,
-    /// How far, m.
+    /// Length of the search, m.
     pub search: f64,
-    /// Where the surface will be, as predicted from the touches so far.
+    /// Position of the surface, predicted from earlier touches.
     pub expected: Option<Expected>,
 }
 
 impl TouchPlan {
-    /// Centre of the ball where a search without contact ends.
+    /// Centre of the ball at the end of a search without contact.
     pub fn end(&self) -> Point3<f64> {
         self.from + self.direction.into_inner() * self.search
     }
 }
 
-/// How far from where a search begins the surface is expected.
+/// Expected distance of the surface from the start of a search.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Expected {
-    /// of the ball's centre, m
+    /// travel of the ball's centre, m
     pub travel: f64,
-    /// standard deviation, m
+    /// standard deviation of the travel, m
     pub sigma: f64,
 }
 
 /// The result of a touch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum TouchResult {
-    /// The ball was stopped.
+    /// A contact at a known place.
     At {
-        /// its centre, m in O
+        /// centre of the ball, m in O
         centre: Point3<f64>,
         /// standard deviation along the direction, m
         sigma: f64,
@@ -168,13 +168,12 @@ pub enum TouchResult {
     Unclear,
 }
 
-/// What is asked of the numbers of a feature where a decision is the goal: the standard deviation
-/// of each that is open, m; `None`: nothing is asked of it.
+/// Requested standard deviations of a feature's open numbers for a decision, m; `None`: no request.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct OpenNumbers {
-    /// of the place, along each axis
+    /// place, along each axis
     pub place: Option<f64>,
-    /// of the diameter or width
+    /// diameter or width
     pub size: Option<f64>,
     pub length: Option<f64>,
 }
@@ -183,23 +182,23 @@ pub(super) struct OpenNumbers {
 #[derive(Clone, Debug)]
 pub(super) struct SearchContext {
     pub params: PatternParams,
-    /// z out of the part, origin at the flag on the surface; maps the frame F of the search to O
+    /// maps the frame F of the search to O: z out of the part, origin at the flag on the surface
     pub pose_of: Isometry3<f64>,
-    /// of its z from the normal of the surface, standard deviation in each of two directions, rad
+    /// lean of its z from the surface's normal, standard deviation in each of two directions, rad
     pub lean: f64,
-    /// of the surface in F
+    /// height of the surface in F
     pub height: f64,
     pub touches: usize,
-    /// what touches are chosen for in place of the wanted number, once a decision is the goal and
-    /// the shape is known
+    /// purpose of touches in place of the wanted number, once a decision is the goal and the shape
+    /// is known
     pub open: Option<OpenNumbers>,
-    /// of the scan, seen along the normal at the flag
+    /// outline of the scan, seen along the normal at the flag
     pub outline: Arc<Outline>,
-    /// places of the surface, in O, that were not touched, for the scan has no part there
+    /// places of the surface, in O, without touches, for the scan has no part there
     pub left_out: Vec<Point3<f64>>,
 }
 
-/// A touch from above goes down the normal within this (cosine).
+/// Cosine of the maximum angle between a touch from above and the normal.
 const DOWN: f64 = 0.99;
 
 impl SearchContext {
@@ -212,20 +211,20 @@ impl SearchContext {
         self.is_down(planned) && !self.outline.is_part(&planned.from, 0.0)
     }
 
-    /// Notes that a place of F is not touched.
+    /// Records a place of F without a touch.
     pub fn leave_out(&mut self, place: &Point3<f64>) {
         self.left_out
             .push(self.pose_of * Point3::new(place.x, place.y, self.height));
     }
 
-    /// Whether all of the ball is over the part at a place of F.
+    /// Whether the whole ball is over the part at a place of F.
     pub fn is_over_part(&self, place: &Point3<f64>) -> bool {
         self.outline
             .is_part(&(self.pose_of * place), self.params.ball_radius)
     }
 
-    /// One of several places of F that are touched from above; where it is beside the part, the
-    /// place of others that is over it and farthest from all that are touched.
+    /// One of several places of F for touches from above; for a place beside the part, the one of
+    /// `others` over the part and farthest from all touched places.
     pub fn over_part(
         &mut self,
         at: usize,
@@ -259,10 +258,10 @@ impl SearchContext {
         wanted[at]
     }
 
-    /// One of [`AROUND`] places of F around a middle, or elsewhere around it where that one is
-    /// beside the part.
+    /// One of [`AROUND`] places of F around a middle, or another around it if that is beside the
+    /// part.
     ///
-    /// - `first`: so many of their steps from x to the first; `away`: from the middle, m.
+    /// - `first`: number of their steps from x to the first; `away`: from the middle, m.
     pub fn around(
         &mut self,
         at: usize,
@@ -285,12 +284,12 @@ impl SearchContext {
         self.pose_of.inverse_transform_point(point)
     }
 
-    /// Centre of a ball that is clear of the surface.
+    /// Height of the centre of a ball clear of the surface.
     pub fn clear(&self) -> f64 {
         self.height + self.params.ball_radius + self.params.clearance
     }
 
-    /// Down at a place of F.
+    /// Touch down at a place of F.
     pub fn down(&self, place: &Point3<f64>, search: f64) -> TouchPlan {
         let from = self.pose_of * Point3::new(place.x, place.y, self.clear());
         TouchPlan {
@@ -302,7 +301,7 @@ impl SearchContext {
         }
     }
 
-    /// From a place of F, at a depth below the surface, along a direction of F.
+    /// Touch from a place of F, at a depth below the surface, along a direction of F.
     pub fn sideways(
         &self,
         place: &Point3<f64>,
@@ -321,18 +320,18 @@ impl SearchContext {
         }
     }
 
-    /// Down at the flag, then at the places of a ring around it.
+    /// Touch down at the flag, then at the places of a ring around it.
     pub fn ring(&self, at: usize, radius: f64, search: f64) -> TouchPlan {
         let far = if at == 0 { 0.0 } else { radius };
         self.down(&Point3::from(toward(at as f64 / RING as f64) * far), search)
     }
 
-    /// The place that a ball with its centre there touches below it.
+    /// Height of the place that a ball touches below its centre.
     pub fn below(&self, centre: &Point3<f64>) -> f64 {
         centre.z - self.params.ball_radius
     }
 
-    /// The same of a contact from above, in O.
+    /// Place of a contact from above, in O.
     pub fn end(&self, contact: &Observation) -> End {
         End {
             point: contact.point - self.out() * contact.offset,
@@ -341,15 +340,15 @@ impl SearchContext {
     }
 }
 
-/// Touches of the surface around an opening, or of the ground around a foot …
+/// Touches of the surface around an opening, or of the ground around a foot.
 pub(super) const AROUND: usize = 4;
-/// … and the directions that are looked at where they would go beside the part.
+/// Directions that replace touches beside the part.
 const DIRECTIONS: usize = 24;
 
-/// Places around the flag, beside the flag itself.
+/// Places around the flag, in addition to the flag itself.
 pub(super) const RING: usize = 6;
 
-/// The direction across the surface after a share of a turn, unit vector in F.
+/// Direction across the surface after a share of a turn, unit vector in F.
 pub(super) fn toward(turned: f64) -> Vector3<f64> {
     let angle = turned * TAU;
     Vector3::new(angle.cos(), angle.sin(), 0.0)

@@ -1,8 +1,7 @@
-//! Paths on which the ball slides over a feature that touches have found: along its walls, and
-//! across its rims.
+//! Paths of the ball over a touched feature: along its walls, and across its rims.
 //!
-//! A rim is where a surface above bends down into a wall. The ball's centre stays one radius off
-//! both: straight above, around the rim on a quarter of a circle, straight down along the wall; its
+//! At a rim a surface above bends down into a wall. The ball's centre stays one radius off both:
+//! straight above, around the rim on a quarter of a circle, straight down along the wall; its
 //! normal turns with it.
 
 use std::f64::consts::FRAC_PI_2;
@@ -11,42 +10,42 @@ use nalgebra::{Point3, Unit, Vector3};
 
 use super::search_context::SearchContext;
 
-/// A station of a slide: of a planned one in O, of one that is made in B.
+/// A station of a slide: in O for a plan, in B for its execution.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Station {
-    /// of the ball, where it touches without pressing, m
+    /// centre of the ball in contact without pressure, m
     pub centre: Point3<f64>,
-    /// out of the part
+    /// normal out of the part
     pub normal: Unit<Vector3<f64>>,
 }
 
-/// A path on which the ball slides, in O.
+/// Path of a slide of the ball, in O.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Slide {
-    /// in their order, no farther from each other than a small share of the ball
+    /// stations in order, a small share of the ball apart at most
     pub stations: Vec<Station>,
-    /// the ball is clear of the surface, and of all others, when it is so far along the normal, m
+    /// distance along the normal at which the ball is clear of all surfaces, m
     pub lift: f64,
-    /// from there the path up along this is free …
+    /// direction of the free path up from there
     up: Unit<Vector3<f64>>,
-    /// … to this height along it, m from the origin of O
+    /// height of its end along it, m from the origin of O
     height: f64,
 }
 
 impl Slide {
-    /// Where the ball is clear of the surface at a station, m.
+    /// Centre of the ball clear of the surface at a station, m.
     pub fn lifted(&self, station: usize) -> Point3<f64> {
         let Station { centre, normal } = self.stations[station];
         centre + normal.into_inner() * self.lift
     }
 
-    /// Straight above that, m.
+    /// Place straight above [`Self::lifted`], m.
     pub fn above(&self, station: usize) -> Point3<f64> {
         let lifted = self.lifted(station);
         lifted + self.up.into_inner() * (self.height - lifted.coords.dot(&self.up)).max(0.0)
     }
 
-    /// Of the ball's path, m.
+    /// Length of the ball's path, m.
     pub fn length(&self) -> f64 {
         self.stations
             .windows(2)
@@ -55,40 +54,40 @@ impl Slide {
     }
 }
 
-/// Two stations are no farther apart, over the ball's radius.
+/// Maximum distance of two stations, over the ball's radius.
 const CLOSE: f64 = 0.1;
-/// Lines are so far apart, over the ball's radius.
+/// Distance of lines, over the ball's radius.
 const LINES: f64 = 1.0;
-/// No feature has more of them along its wall …
+/// Maximum number of lines along the wall of a feature.
 const MOST_LEVELS: usize = 8;
-/// … and across its rim.
+/// Maximum number of crossings of its rim.
 const MOST_CROSSINGS: usize = 24;
-/// Crossings are so far apart along a rim, over the ball's radius.
+/// Distance of crossings along a rim, over the ball's radius.
 const CROSSINGS: f64 = 2.0;
-/// Pieces that a path between two of them is measured by.
+/// Pieces in the length of a path between two crossings.
 const PIECES: usize = 8;
-/// With less room the ball cannot be lifted off a wall, over its radius.
+/// Minimum room for lifting the ball off a wall, over its radius.
 const LEAST_ROOM: f64 = 0.2;
 
 /// A rim, in F: its place and the direction over it, from the surface above into the open, at a
 /// share of its length.
 pub(super) struct RimStation<'a> {
     pub at: &'a dyn Fn(f64) -> (Point3<f64>, Vector3<f64>),
-    /// m
+    /// length of the rim, m
     pub length: f64,
-    /// its end is its beginning
+    /// whether its end is its beginning
     pub is_closed: bool,
-    /// how far back from the rim the surface above is known, to the ball's centre, m
+    /// extent of the known surface above back from the rim, to the ball's centre, m
     pub back: f64,
-    /// how far below the rim the ball's centre may come, m; above the first the rim may be broken
+    /// depths of the ball's centre below the rim, m; above the first the rim may be broken
     pub depths: [f64; 2],
-    /// from the wall the ball can be lifted so far, m
+    /// room for lifting the ball off the wall, m
     pub room: f64,
 }
 
 impl RimStation<'_> {
     /// - `path`: length of the path of the ball's centre from above the surface to down at the
-    ///   wall, m; 0 where it begins to turn.
+    ///   wall, m; 0 at the start of its turn.
     fn station(&self, context: &SearchContext, share: f64, path: f64) -> Station {
         let ball = context.params.ball_radius;
         let (rim, over) = (self.at)(share);
@@ -135,7 +134,7 @@ impl RimStation<'_> {
     fn zigzag(&self, context: &SearchContext, deep: f64) -> Slide {
         let ball = context.params.ball_radius;
         let count = ((self.length / (CROSSINGS * ball)) as usize).clamp(2, MOST_CROSSINGS);
-        // where the end is the beginning it is not crossed again
+        // a closed rim has no crossing at its end
         let share = |crossing: usize| {
             crossing as f64 / if self.is_closed { count } else { count - 1 } as f64
         };
@@ -207,7 +206,7 @@ pub(super) fn stadium_rim(
 }
 
 impl SearchContext {
-    /// A slide: down from free air to its stations, and up again from wherever it ends.
+    /// A slide: down from free air to its stations, and up again from its actual end.
     fn slide(&self, stations: Vec<Station>) -> Slide {
         let up = Unit::new_normalize(self.out());
         let above = self.pose_of * Point3::new(0.0, 0.0, self.clear());
@@ -219,7 +218,7 @@ impl SearchContext {
         }
     }
 
-    /// To and fro over a field of the surface, within a radius around the flag.
+    /// Slide to and fro over a field of the surface, within a radius around the flag.
     pub(super) fn raster(&self, radius: f64) -> Slide {
         let ball = self.params.ball_radius;
         let count = (2.0 * radius / (LINES * ball)).ceil().max(1.0);
@@ -232,7 +231,7 @@ impl SearchContext {
         self.along(&(0..count as usize).flat_map(line).collect::<Vec<_>>())
     }
 
-    /// Over places of the surface, in F, from one to the next.
+    /// Slide over places of the surface, in F, from one to the next.
     pub(super) fn along(&self, places: &[Point3<f64>]) -> Slide {
         let ball = self.params.ball_radius;
         let mut stations = Vec::new();

@@ -1,15 +1,15 @@
-//! A slot from one flag: where the ball falls in, its direction, its ends, then its walls and ends.
+//! A slot from one flag: its opening, its direction, its ends, then its walls and ends.
 //!
-//! 1. Where the ball falls in ([`OpeningSearch`]).
+//! 1. A place for the ball to fall in ([`OpeningSearch`]).
 //! 2. Sideways from there in eight directions: a first slot, whose ends may be open.
-//! 3. Down beside it: the plane of its opening. A long path sideways stays at its depth only from
-//!    here on.
+//! 3. Down beside it: the plane of its opening. Only from here on does a long path sideways stay at
+//!    its depth.
 //! 4. Along it to both ends, then down to its floor.
-//! 5. Each end on its middle and to both sides of it, then walls and ends where a touch has the
-//!    largest gain.
+//! 5. Each end on its middle and to both sides of it, then walls and ends by the largest gain of a
+//!    touch.
 //!
-//! Whether its ends are round or straight is what the contacts agree with. Corners of a slot with
-//! straight ends are not touched, and what was touched there before it was known does not count.
+//! The contacts decide between round and straight ends. Corners of a slot with straight ends are
+//! not touched, and earlier contacts there do not count.
 
 use std::f64::consts::PI;
 
@@ -30,44 +30,44 @@ use super::slot_fit::{CORNER, SlotFit};
 use crate::features::fit::{Ends, FitParams, Freedom, Observation, Stadium, Surface, fit};
 use crate::features::{End, Feature};
 
-/// What may say that walls lean: both of them, across the slot. Along it only its ends would, and
-/// what was taken for one may be an obstacle.
+/// Freedom in which walls may lean: across the slot, by both walls. Along it only the ends would
+/// show a lean, and an assumed end may be an obstacle.
 const LEAN: [Freedom; 1] = [Freedom::TiltY];
-/// First directions: five numbers are unknown.
+/// Number of first directions: five numbers are unknown.
 const FIRST: usize = 8;
-/// Walls that have to be touched in them.
+/// Minimum number of walls touched in these directions.
 const LEAST_FIRST: usize = 5;
-/// A ball that slid in over a rim has no clear contact in so many directions.
+/// Directions without a clear contact after which the ball has slid in over a rim.
 const SLID_IN: usize = 3;
-/// An end is searched for so many times at most.
+/// Maximum number of searches for an end.
 const SEARCHES: usize = 6;
-/// Places along a wall, and around an end, that are candidates.
+/// Candidate places along a wall, and around an end.
 const ALONG: usize = 9;
-/// So many touches of the walls before they are believed.
+/// Minimum number of touches for credible walls.
 const LEAST_WALL: usize = 10;
-/// A wall is searched so much farther than expected, m.
+/// Search beyond an expected wall, m.
 const BEYOND: f64 = 3e-3;
-/// An end is believed when it was touched on its middle and on both sides of it: angles from the
-/// slot's direction, rad. One touch alone may have met anything; three that lie on one half circle
-/// as wide as the slot have met its end.
+/// Parts of an end that need a touch, its middle and both sides: angles from the slot's direction,
+/// rad. One touch alone may be of any object; three on one half circle as wide as the slot are of
+/// its end.
 const PARTS: [[f64; 2]; 3] = [
     [-PI / 3.0, -PI / 8.0],
     [-PI / 8.0, PI / 8.0],
     [PI / 8.0, PI / 3.0],
 ];
-/// The same parts of a straight end: across the slot, over the distance of the ball's centre from
+/// Parts of a straight end: positions across the slot, over the distance of the ball's centre from
 /// the middle line.
 const STRAIGHT_PARTS: [[f64; 2]; 3] = [[-0.5, -0.15], [-0.15, 0.15], [0.15, 0.5]];
-/// So far from the middle of a wall candidates go at the most, over where its corners begin: they
-/// are met a little elsewhere.
+/// Farthest candidate from the middle of a wall, over the start of its corners: their position is
+/// not exact.
 const OFF_CORNER: f64 = 0.85;
-/// Walls agree with contacts that are this far off, rms, over the standard deviation of a touch.
+/// Rms of contacts that agree with the walls, over the standard deviation of a touch.
 const AGREES: f64 = 2.0;
-/// Walls may be this much nearer than where the ball went freely, m.
+/// Overlap of walls with free positions of the ball that is tolerable, m.
 const SLACK: f64 = 0.2e-3;
-/// A ball that sank by less than this lay on the surface, m …
+/// Depth below which a ball lay on the surface, m.
 const FLAT: f64 = 0.1e-3;
-/// … or on a rim with its centre beyond it by less than this, over its radius.
+/// Distance of the ball's centre beyond a rim, over its radius, below which it lay on the rim.
 const ON_RIM: f64 = 0.5;
 
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -76,7 +76,7 @@ enum SlotPhase {
     Opening,
     First,
     Around,
-    /// along the slot, in a direction of its x, from so far beyond where the ball fell in, m
+    /// along the slot: sign of its x, and distance of the start beyond the first place, m
     End(f64, f64),
     Floor,
     Wall,
@@ -86,12 +86,12 @@ enum SlotPhase {
 pub(super) struct SlotPattern {
     phase: SlotPhase,
     opening: OpeningSearch,
-    /// where the ball fell in, in F
+    /// place at which the ball fell in, in F
     middle: Point3<f64>,
     measuring: Measuring,
     /// contacts in the corners of a slot with straight ends
     corners: Vec<Observation>,
-    /// as far as it is known, in F and in O
+    /// estimate of the slot, in F and in O
     slot_fit: Option<SlotFit>,
     walls: Option<Stadium>,
     floor: Option<End>,
@@ -99,10 +99,10 @@ pub(super) struct SlotPattern {
     tried: usize,
     /// contacts at unknown places among the first touches
     unclear: usize,
-    /// places of the ball's centre at the end of searches without contact: where it fell in, and
-    /// along the slot; m in O
+    /// centres of the ball after searches without contact: at its fall into the slot, and along it;
+    /// m in O
     free: Vec<Point3<f64>>,
-    /// where the ball lay when it did not fall in, m in O
+    /// centres of a ball that did not fall in, m in O
     on_top: Vec<Point3<f64>>,
 }
 
@@ -114,7 +114,7 @@ impl SlotPattern {
         }
     }
 
-    /// The walls through the contacts, at the height of the surface, so that depths are coordinates
+    /// Fits the walls to the contacts, at the height of the surface, so that depths are coordinates
     /// of their frame.
     fn renew(&mut self, context: &SearchContext) {
         let corners = std::mem::take(&mut self.corners);
@@ -202,7 +202,7 @@ impl SlotPattern {
             Quantity::Length => asked.each(&[Freedom::Second], sigma),
             Quantity::Width => asked.each(&[Freedom::Size], sigma),
             Quantity::All | Quantity::Diameter => {
-                // its direction as well as its ends are known
+                // direction as certain as the ends
                 let asked = asked.each(&[Freedom::X, Freedom::Y], sigma);
                 asked
                     .each(&[Freedom::Turn], 2.0 * sigma / walls.length)
@@ -218,8 +218,8 @@ impl SlotPattern {
         }
     }
 
-    /// The part of an end that was not touched yet: the sign of the end along the slot, and its
-    /// angles. Touches that the fit holds for none of these walls do not count.
+    /// An untouched part of an end: the sign of the end along the slot, and its angles. Touches
+    /// that the fit rejects do not count.
     fn open_part(&self, context: &SearchContext, walls: &Stadium) -> Option<(f64, [f64; 2])> {
         let (half, ball) = (
             (walls.length - walls.width).max(0.0) / 2.0,
@@ -248,7 +248,7 @@ impl SlotPattern {
                 }
             })
         };
-        // the middle of an end first: it says where its sides are
+        // the middle of an end first: it determines its sides
         let parts = if walls.ends == Ends::Round {
             PARTS
         } else {
@@ -262,8 +262,8 @@ impl SlotPattern {
             .find(|(sign, part)| !is_touched(*sign, *part))
     }
 
-    /// Whether the walls agree with the free places of the ball, which lie inside, and with those
-    /// on top, which do not.
+    /// Whether the walls agree with the free positions of the ball, which lie inside, and with
+    /// positions on top, which do not.
     fn is_consistent(&self, context: &SearchContext, walls: &Stadium) -> bool {
         let ball = context.params.ball_radius;
         let has_room = |centre: &Point3<f64>| walls.distance(centre) > ball - SLACK;
@@ -273,8 +273,8 @@ impl SlotPattern {
         self.free.iter().all(has_room) && !self.on_top.iter().any(is_over)
     }
 
-    /// Touches of walls and ends, each from the middle line of the slot; of one part of an end
-    /// alone where that is open.
+    /// Touches of walls and ends, each from the middle line of the slot; only of one part of an end
+    /// if that is open.
     fn possible(
         &self,
         context: &SearchContext,
@@ -305,7 +305,7 @@ impl SlotPattern {
         self.sideways_from(context, walls, places, radius, travel)
     }
 
-    /// The same with straight ends: across from the middle line, and along it from half a width
+    /// The same for straight ends: across from the middle line, and along it from half a width
     /// before the end, away from the corners.
     fn possible_straight(
         &self,
@@ -346,7 +346,7 @@ impl SlotPattern {
         )
     }
 
-    /// Touches from places of the middle plane of the walls along directions of it, at both depths.
+    /// Touches from places in the middle plane of the walls along directions in it, at both depths.
     fn sideways_from(
         &self,
         context: &SearchContext,
@@ -379,7 +379,7 @@ impl SlotPattern {
         if touch.result == TouchResult::Unclear {
             self.unclear += 1;
         }
-        // one unclear touch may have been anything
+        // one unclear touch may be of any object
         if self.measuring.observations.is_empty()
             && self.corners.is_empty()
             && self.unclear >= SLID_IN
@@ -401,7 +401,7 @@ impl SlotPattern {
         self.phase = SlotPhase::Around;
     }
 
-    /// Takes a touch that searched for walls.
+    /// Takes a touch of a search for walls.
     fn take_wall(&mut self, touch: &Touched) {
         self.measuring.take(touch);
         if touch.result == TouchResult::Nothing {
@@ -446,13 +446,13 @@ impl SlotPattern {
     }
 }
 
-/// From −1 to 1 in even steps.
+/// Even steps from −1 to 1.
 fn spread(at: usize, count: usize) -> f64 {
     at as f64 / (count - 1) as f64 * 2.0 - 1.0
 }
 
 /// Places around the walls of a slot: along each side, then about the middle of each end; x of the
-/// middle line that a place is touched from, and the angle towards it.
+/// start on the middle line, and the angle of the touch.
 pub(super) fn around_stadium(half: f64, count: usize) -> impl Iterator<Item = (f64, f64)> {
     let spread = move |at: usize| spread(at, count);
     let sides =
@@ -535,7 +535,7 @@ impl Stage for SlotPattern {
                 context.sideways(&from, shallow, &in_f(Vector3::x() * sign), REACH + ball)
             }
             SlotPhase::Floor => context.sideways(&centre, shallow, &-Vector3::z(), REACH),
-            // those before have returned
+            // the other phases have returned
             SlotPhase::Wall | SlotPhase::Opening | SlotPhase::First => {
                 let possible = self.possible(context, &walls, self.open_part(context, &walls));
                 let wanted = self.wanted(context, &walls);
@@ -574,7 +574,7 @@ impl Stage for SlotPattern {
         let top = surface_about(context, &context.in_f(&walls.center()), &self.opening.top)?;
         let (_, params) = self.squareness(context, walls);
         let fitted = self.measuring.fitted(walls, &params)?;
-        // where an end was not touched it has no length, and no middle
+        // an untouched end leaves length and middle open
         fitted.std(Freedom::Second).ok_or_else(not_done)?;
         let touches = numbers([&self.measuring.observations, &self.opening.top]);
         Ok(Some(Feature::slot(

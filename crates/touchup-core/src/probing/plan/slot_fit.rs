@@ -1,5 +1,5 @@
-//! The slot through few touches: where the ball's centre was stopped lies at one distance from a
-//! segment, or on a rectangle where its ends are straight.
+//! Fit of a slot to few touches: the ball's centres lie at one distance from a segment, or on a
+//! rectangle for straight ends.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -8,50 +8,49 @@ use nalgebra::{Matrix5, Point2, Vector2, Vector5};
 use crate::features::fit::{Ends, from_segment};
 use crate::numeric::{DampedSearch, NormalEquations};
 
-/// All points at a distance from a segment of a plane; with straight ends the rectangle around
-/// them.
+/// All points at a distance from a segment of a plane; for straight ends the rectangle around them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct SlotFit {
-    /// of the segment, m
+    /// middle of the segment, m
     pub middle: Point2<f64>,
-    /// of the segment, from x, rad
+    /// angle of the segment, from x, rad
     pub angle: f64,
-    /// half its length, m
+    /// half the length of the segment, m
     pub half: f64,
-    /// distance from it, m
+    /// distance from the segment, m
     pub radius: f64,
     pub ends: Ends,
 }
 
-/// Directions that are tried as first guesses.
+/// Directions of first guesses.
 const ANGLES: usize = 24;
-/// Half lengths that are tried as first guesses, over the farthest point.
+/// Half lengths of first guesses, over the farthest point.
 const HALVES: [f64; 4] = [0.3, 0.6, 0.9, 1.2];
-/// Places that are free may be this much beyond it, m.
+/// Maximum distance of free places beyond the slot, m.
 const BESIDE: f64 = 0.2e-3;
-/// Fits whose residuals are below this, rms, agree with the points: noise of a touch, and its
-/// sliding at a flat angle, m.
+/// Rms of residuals below which a fit agrees with the points: noise of a touch, and its sliding at
+/// a flat angle, m.
 const AGREES: f64 = 20e-6;
-/// Where along it the place is that the ball fell in, over its half length.
+/// Positions of the ball's fall along first guesses, over their half length.
 const SHIFTS: [f64; 3] = [-0.9, 0.0, 0.9];
-/// The other ends are believed where they lower the residuals to less than this share.
+/// Share of the residuals below which the other kind of ends is credible.
 const BETTER: f64 = 0.5;
-/// A slot with straight ends may be shorter than wide by this, over half its width: what is nearly
-/// square has no long side to choose.
+/// Length that a slot with straight ends may lack against its width, over half its width: a nearly
+/// square slot has no long side to choose.
 const SHORTER: f64 = 0.5;
-/// Slots with straight ends are turned so that they are longer than wide, but for this share of
-/// half the width.
+/// Lack of length, over half the width, up to which a slot with straight ends is not turned to be
+/// longer than wide.
 const SQUARE: f64 = 0.02;
-/// Corners of straight ends are as large as this at most, over the distance of the ball's centre
-/// from the middle line …
+/// Maximum size of the corners of straight ends, over the distance of the ball's centre from the
+/// middle line.
 pub(super) const CORNER: f64 = 0.5;
-/// … and which points are of them is decided so many times.
+/// Rounds that assign points to corners.
 const CORNER_ROUNDS: usize = 3;
-/// So many of the points lie elsewhere.
+/// Minimum share of the points off the corners.
 const LEAST_KEPT: f64 = 0.6;
-/// Of the fit.
+/// Unknowns of the fit.
 const FREEDOMS: usize = 5;
-/// All of its steps are made: no touch says how near is near enough.
+/// A search that makes all of its steps: no touch says which step is small enough.
 const SEARCH: DampedSearch = DampedSearch {
     first: 1e-3,
     factors: [0.2, 5.0],
@@ -59,24 +58,24 @@ const SEARCH: DampedSearch = DampedSearch {
     most: f64::INFINITY,
     tries: 60,
 };
-/// Of first guesses with straight ends, whose best one is fitted in full.
+/// A search from first guesses with straight ends; the best gets a full fit.
 const COARSE: DampedSearch = DampedSearch {
     tries: 12,
     ..SEARCH
 };
-/// A fit that does not agree with the points is looked for anew at each so many of them.
+/// Points between new searches for a fit that disagrees with them.
 const ANEW: usize = 4;
-/// What no touch determines stays where it is: weight of the guess against one touch.
+/// Weight of the guess against one touch: it holds freedoms that no touch determines.
 const HELD: f64 = 1e-9;
 
 impl SlotFit {
-    /// Unit vector along it.
+    /// Unit vector along the slot.
     pub fn along(&self) -> Vector2<f64> {
         Vector2::new(self.angle.cos(), self.angle.sin())
     }
 
-    /// How far a point is from where it should be, m, and the derivatives by middle, angle, half
-    /// length and radius.
+    /// Distance of a point from the slot, m, and the derivatives by middle, angle, half length and
+    /// radius.
     fn residual(&self, p: &Point2<f64>) -> (f64, Vector5<f64>) {
         let (u, v) = (p - self.middle, self.along());
         let w = Vector2::new(-v.y, v.x);
@@ -102,7 +101,7 @@ impl SlotFit {
         )
     }
 
-    /// Distance of a place of its axes from its nearest side, m, and the unit vector away from it.
+    /// Distance of a place of its axes from the nearest side, m, and the unit vector away from it.
     fn outside_rectangle(&self, x: f64, y: f64) -> (f64, [f64; 2]) {
         let (beyond_end, beyond_wall) = (x.abs() - self.half - self.radius, y.abs() - self.radius);
         if beyond_end > beyond_wall {
@@ -121,7 +120,7 @@ impl SlotFit {
             .sqrt()
     }
 
-    /// By least squares from a first guess.
+    /// Least-squares fit from a first guess.
     pub fn fitted(self, points: &[Point2<f64>]) -> Self {
         self.fitted_by(&SEARCH, points)
     }
@@ -176,8 +175,8 @@ impl SlotFit {
             .0
     }
 
-    /// The same of a slot with straight ends, without the points of its corners; what is longer
-    /// than wide.
+    /// The same for straight ends, without the points of its corners; the longer side is the
+    /// length.
     fn fitted_straight(self, search: &DampedSearch, points: &[Point2<f64>]) -> Self {
         let begun = self.fitted_by(search, points);
         let fitted = (0..CORNER_ROUNDS).fold(begun, |fit, _| {
@@ -196,7 +195,7 @@ impl SlotFit {
         .fitted_by(search, &fitted.off_corners(points))
     }
 
-    /// Whether a point may be of a corner of straight ends, which is no corner of the fit.
+    /// Whether a point may be in a corner of straight ends, which the fit does not model.
     pub fn is_in_corner(&self, p: &Point2<f64>) -> bool {
         let (u, v) = (p - self.middle, self.along());
         let corner = CORNER * self.radius;
@@ -214,8 +213,8 @@ impl SlotFit {
             .collect()
     }
 
-    /// How many free places are outside of it, and its residuals but for corners, rms by the
-    /// degrees of freedom, m; infinite where too few points are left.
+    /// Number of free places outside, and residuals off the corners, rms by the degrees of freedom,
+    /// m; infinite for too few points.
     fn cost(&self, points: &[Point2<f64>], free: &[Point2<f64>]) -> (usize, f64) {
         let kept = self.off_corners(points);
         let beside = free.iter().filter(|p| self.residual(p).0 > BESIDE).count();
@@ -236,9 +235,9 @@ impl SlotFit {
         (beside, rms)
     }
 
-    /// Its fit to more points; where that does not agree with them, now and then the best of all.
+    /// Fit to more points; if it disagrees with them, the best of all fits at intervals.
     ///
-    /// - `agrees`: residuals of a fit that does, m.
+    /// - `agrees`: residuals of a fit that agrees, m.
     pub fn fitted_to_more(self, points: &[Point2<f64>], free: &[Point2<f64>], agrees: f64) -> Self {
         let near = if self.ends == Ends::Round {
             self.fitted(points)
@@ -256,10 +255,9 @@ impl SlotFit {
         other.unwrap_or(near)
     }
 
-    /// The best one through points around a place, in any direction, among those with the free
-    /// places inside. Where no point is at an end many lengths agree: then the shortest of them,
-    /// whose ends lie no farther than what was touched. Ends are round where the points do not say
-    /// otherwise.
+    /// Best slot through points around a place, in any direction, with the free places inside. If
+    /// no point is at an end many lengths agree: then the shortest counts, whose ends lie no
+    /// farther than the contacts. Ends are round unless the points say otherwise.
     ///
     /// - `agrees`: residuals of a fit that agrees with the points, m.
     pub fn through(
@@ -291,8 +289,8 @@ impl SlotFit {
         let distance = |p: &Point2<f64>| (p - place).norm();
         let near = points.iter().map(distance).fold(f64::INFINITY, f64::min);
         let far = points.iter().chain(free).map(distance).fold(0.0, f64::max);
-        // a point beside the segment determines neither end: one of them has to be near where it
-        // really is
+        // a point beside the segment determines neither end: a guess has to have one end near its
+        // true place
         let guess = |angle: f64, half: f64, shift: f64| {
             let direction = Vector2::new(angle.cos(), angle.sin());
             Self {
@@ -323,7 +321,7 @@ impl SlotFit {
         .map(|(.., fit)| fit)
     }
 
-    /// The same, with its direction as that of another rather than against it.
+    /// The same slot, with its direction along another's rather than against it.
     pub fn along_as(self, other: &Self) -> Self {
         let turn = if self.along().dot(&other.along()) < 0.0 {
             PI
@@ -341,7 +339,7 @@ impl SlotFit {
 mod tests {
     use super::*;
 
-    /// Places of a slot from (−9, 0) to (5, 0) with a distance of 1.5 around its segment, by hand.
+    /// Points at a distance of 1.5 around the segment from (−9, 0) to (5, 0), by hand.
     #[test]
     fn eight_touches_determine_a_slot() {
         let points = [
@@ -376,8 +374,8 @@ mod tests {
         );
     }
 
-    /// Touched on its straight walls alone, a slot may have any length from that of what was
-    /// touched on: no more is believed.
+    /// With contacts on its straight walls alone, a slot may have any length from theirs on: the
+    /// fit has no more.
     #[test]
     fn a_slot_with_open_ends_is_no_longer_than_what_was_touched() {
         let walls = [
@@ -399,11 +397,11 @@ mod tests {
         assert!(found.half > 3.5e-3 && found.half < 7e-3, "{found:?}");
     }
 
-    /// Near one end, seven touches leave the direction of a slot of 20 × 6 open; where the ball
-    /// moved freely determines it.
+    /// Near one end, seven touches leave the direction of a slot of 20 × 6 open; a free place
+    /// determines it.
     #[test]
     fn a_free_place_determines_the_direction_of_a_slot() {
-        // the ball's centre 0.35 mm before the centre of the right end, as if by hand
+        // the ball's centre 0.35 mm before the centre of the right end, by hand
         let points = [
             [1.15, 0.0],
             [0.85, 1.08],

@@ -18,9 +18,9 @@ pub fn sigma_of(half_width: f64, confidence: f64) -> f64 {
     half_width / f64::midpoint(low, high)
 }
 
-/// No probability below 1 − 1e-9 needs more deviations.
+/// Deviations that suffice for any probability below 1 − 1e-9.
 const HIGHEST: f64 = 6.2;
-/// Halves the range below the last digit.
+/// Number of bisections, to below the last digit.
 const BISECTIONS: usize = 60;
 
 /// Share of a normal distribution within ± z deviations.
