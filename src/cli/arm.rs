@@ -1,4 +1,4 @@
-//! The arm that a verb works with: a simulated one, a UR, or one behind ros2_control.
+//! Arm of a verb: simulated, a UR, or behind ros2_control.
 
 use std::path::{Path, PathBuf};
 
@@ -27,13 +27,12 @@ use crate::stylus::Payload;
 #[cfg(feature = "ur")]
 use crate::ur::{UrArm, UrParams};
 
-/// Which arm.
+/// Kind of arm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(super) enum RobotName {
-    /// A simulated one, against the part of --truth
+    /// Simulated arm, against the part of --truth
     Sim,
-    /// A UR, at robot.host of the scene (docs/ur.md); only where touchup was built with the feature
-    /// `ur`
+    /// UR arm at robot.host of the scene (docs/ur.md); needs touchup built with the feature `ur`
     Ur,
     /// Any arm behind ros2_control, on the topics of robot.ros2_control of the scene
     /// (docs/ros2_control.md)
@@ -41,7 +40,7 @@ pub(super) enum RobotName {
     Ros2Control,
 }
 
-/// Set where the controller is a simulation whose clock waits for its client: docs/ur.md.
+/// Environment variable for a simulated controller whose clock waits for its client: docs/ur.md.
 #[cfg(feature = "ur")]
 const LOCK_STEP: &str = "TOUCHUP_UR_LOCK_STEP";
 
@@ -49,11 +48,11 @@ const LOCK_STEP: &str = "TOUCHUP_UR_LOCK_STEP";
 const NO_HOST: &str =
     "--robot ur needs robot.host and robot.site_packages in the scene (docs/ur.md)";
 
-/// The UR of a scene.
+/// Connects to the UR of a scene.
 ///
 /// # Errors
-/// [`CliError::usage`] where the scene names none, or touchup was built without it;
-/// [`CliError::arm`] where it does not answer.
+/// [`CliError::usage`] if the scene names no UR or touchup lacks the feature; [`CliError::arm`] if
+/// the UR does not answer.
 #[cfg(feature = "ur")]
 pub(super) fn connect_ur(scene: &Scene) -> Result<Box<dyn Arm + Send>, CliError> {
     Ok(Box::new(
@@ -61,10 +60,10 @@ pub(super) fn connect_ur(scene: &Scene) -> Result<Box<dyn Arm + Send>, CliError>
     ))
 }
 
-/// The UR of a scene, after its stop was cleared as far as a call can.
+/// Connects to the UR of a scene and clears its stop as far as calls can.
 ///
 /// # Errors
-/// As [`connect_ur`]; [`CliError::stopped`] where it takes a hand at its panel.
+/// As [`connect_ur`]; [`CliError::stopped`] if the stop needs an operator at the panel.
 #[cfg(feature = "ur")]
 pub(super) fn recovered_ur(scene: &Scene) -> Result<Box<dyn Arm + Send>, CliError> {
     Ok(Box::new(
@@ -105,11 +104,11 @@ pub(super) fn recovered_ur(scene: &Scene) -> Result<Box<dyn Arm + Send>, CliErro
 const NO_UR: &str = "this touchup was built without a UR: `cargo install --locked --path . --features ur` in its folder makes one with \
                      it, which needs a Python with its shared library (docs/ur.md)";
 
-/// The arm behind ros2_control of a scene, on the network of the environment.
+/// Connects to the ros2_control arm of a scene, on the network of the environment.
 ///
 /// # Errors
-/// [`CliError::usage`] where the scene names no arm, or touchup was built without ROS;
-/// [`CliError::arm`] where it is not at command.
+/// [`CliError::usage`] if the scene names no arm or touchup lacks ROS; [`CliError::arm`] if the arm
+/// accepts no commands.
 #[cfg(any(feature = "ros", feature = "r2r"))]
 fn connect_ros2_control(scene: &Scene) -> Result<Box<dyn Arm + Send>, CliError> {
     let config = NodeConfig::named("touchup_arm", &[], |name| std::env::var(name).ok())?;
@@ -123,10 +122,10 @@ fn connect_ros2_control(_: &Scene) -> Result<Box<dyn Arm + Send>, CliError> {
     ))
 }
 
-/// The arm behind ros2_control of a scene.
+/// Connects to the ros2_control arm of a scene.
 ///
 /// # Errors
-/// [`CliError::usage`] where the scene names no arm; [`CliError::arm`] where it is not at command.
+/// [`CliError::usage`] if the scene names no arm; [`CliError::arm`] if it accepts no commands.
 #[cfg(any(feature = "ros", feature = "r2r"))]
 pub(super) fn ros2_control_arm(
     scene: &Scene,
@@ -177,7 +176,7 @@ pub(super) fn ros2_control_arm(
     ))
 }
 
-/// Of a UR from the base to the wrist, as its description names them.
+/// Joint names of a UR from base to wrist, as in its description.
 #[cfg(any(feature = "ros", feature = "r2r"))]
 const UR_JOINTS: [&str; 6] = [
     "shoulder_pan_joint",
@@ -190,68 +189,68 @@ const UR_JOINTS: [&str; 6] = [
 
 #[derive(Debug, Args)]
 pub(super) struct ArmArguments {
-    /// Which arm
+    /// Kind of arm
     #[arg(long, value_name = "ARM")]
     pub robot: RobotName,
     #[command(flatten)]
     pub cell: CellArguments,
 }
 
-/// The scene of an arm; a verb that has other sources than an arm takes these without the arm.
+/// Scan and scene of an arm, also for verbs with other sources than an arm.
 #[derive(Debug, Args)]
 #[group(id = "cell")]
 pub(super) struct CellArguments {
-    /// The scan: PLY, STL or OBJ, or a point cloud: PLY, PCD, XYZ or E57; not needed when the scene
-    /// names its file
+    /// The scan: mesh (PLY, STL, OBJ) or point cloud (PLY, PCD, XYZ, E57); default: the scene's
+    /// file
     #[arg(long, value_name = "MESH")]
     scan: Option<PathBuf>,
-    /// Unit of the coordinates in the scan's file, and in the part's
+    /// Unit of the coordinates in the files of scan and part
     #[arg(long, value_name = "U", default_value = "mm")]
     mesh_unit: MeshUnit,
-    /// The true part, for a simulated arm: a closed mesh
+    /// True part for a simulated arm: a closed mesh
     #[arg(long, value_name = "MESH")]
     truth: Option<PathBuf>,
-    /// Seed of the noise of the simulated arm, and of its errors
+    /// Seed for noise and errors of the simulated arm
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// By what the simulated arm differs from what the scene tells of it
+    /// Error model of the simulated arm, relative to the scene
     #[arg(long, value_name = "ERRORS", default_value = "none")]
     arm_errors: ArmErrorsName,
 }
 
-/// A measurement with the probe about the scan as it is.
+/// Measurement with the probe on the unrefined scan.
 pub(super) struct Measurement<'a> {
-    /// what this is called while it lasts
+    /// Name of the progress stage.
     pub stage: &'static str,
-    /// what is measured, and where each of it is written as it is measured
+    /// Kind and output file of the measurements.
     pub kept: KeptMeasurements<'a>,
-    /// that stand beside the part
+    /// Reference spheres beside the part.
     pub spheres: &'a [ReferenceSphere],
 }
 
-/// Where the touches of a measurement go.
+/// Output file of the touches.
 #[derive(Debug, Args)]
 pub(super) struct TouchesOutput {
-    /// Output: each touch as it is made, a line of JSON each, so that none is lost whatever ends
-    /// the measurement
+    /// Output: each touch at once as a line of JSON, so that an aborted measurement loses none
     #[arg(long, value_name = "JSONL", requires = "robot")]
     pub touches_out: Option<PathBuf>,
 }
 
-/// True payload of a simulated arm, where it differs from the scene.
+/// True payload of a simulated arm, if it differs from the scene.
 #[derive(Debug, Args)]
 #[group(id = "true_payload")]
 pub(super) struct TruePayload {
     /// True payload of a simulated arm, kg; default: robot.payload_kg of the scene
     #[arg(long, value_name = "M")]
     truth_payload_kg: Option<f64>,
-    /// Its centre of mass in the flange, mm; default: robot.payload_centre_mm of the scene
+    /// Centre of mass of the true payload in the flange, mm; default: robot.payload_centre_mm of
+    /// the scene
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
     truth_payload_centre_mm: Option<String>,
 }
 
 impl TruePayload {
-    /// The simulated arm of a scene with it.
+    /// Simulated arm with this true payload and the payload of the scene as configured.
     pub fn held_by(&self, arm: ArmParams, scene: &Scene) -> Result<ArmParams, CliError> {
         let robot = scene.robot.clone().unwrap_or_default();
         let (mass, centre) = (robot.payload_mass, robot.payload_centre);
@@ -281,7 +280,7 @@ impl TruePayload {
 }
 
 impl CellArguments {
-    /// The scan and the unit of its file.
+    /// Path and unit of the scan.
     pub fn scan(&self, scene: &Path) -> Result<(PathBuf, MeshUnit), CliError> {
         match &self.scan {
             Some(scan) => Ok((scan.clone(), self.mesh_unit)),
@@ -291,7 +290,7 @@ impl CellArguments {
         }
     }
 
-    /// Runs a call on an arm.
+    /// Connects the arm and calls `work` with it.
     ///
     /// - `truth`: turns the simulated arm of the scene into the true one.
     pub fn with<T>(
@@ -320,8 +319,8 @@ impl CellArguments {
         }
     }
 
-    /// Measures something with the probe of an arm about the scan as it is, until a signal stops
-    /// it; returns also the cell.
+    /// Measures with the probe on the unrefined scan, until a signal stops it; also returns the
+    /// cell.
     ///
     /// - `truth`: as in [`Self::with`].
     pub fn measure<T, E: Into<CliError>>(

@@ -1,30 +1,30 @@
-//! By what a simulated arm differs from what its scene tells of it.
+//! Error models of a simulated arm, relative to its scene.
 
 use clap::ValueEnum;
 use nalgebra::{Point3, Vector3};
 
 use crate::sim::{ArmErrorSigmas, ArmErrors, ArmFault, SimArm};
 
-/// By what a simulated arm differs from what is told of it.
+/// Error model of a simulated arm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(super) enum ArmErrorsName {
-    /// By nothing
+    /// No errors
     None,
-    /// By what is left of a UR after calibration, drawn from --seed: standard deviations 10 % of
-    /// the stiffness, 0.002 mm of the ball's radius, 0.05 mm and 0.02° of the place of the part,
-    /// 0.03 mm of repeatability
+    /// Residual errors of a calibrated UR, drawn from --seed: standard deviations 10 % of the
+    /// stiffness, 0.002 mm of the tip radius, 0.05 mm and 0.02° of the part's pose, 0.03 mm of
+    /// repeatability
     Calibrated,
-    /// By nothing, until the probe is bent aside by 1 mm after its twelfth contact
+    /// No errors, until the probe bends aside by 1 mm after its twelfth contact
     Bent,
 }
 
-/// How the probe is bent, m in the axes of the tip, and after how many contacts.
+/// Contacts before the bend, and the bend in the axes of the tip, m.
 const BEND: (usize, Vector3<f64>) = (12, Vector3::new(0.8e-3, 0.6e-3, 0.0));
 
 impl ArmErrorsName {
-    /// The errors of a seed.
+    /// Errors for a seed.
     ///
-    /// - `registered_at`: where the place of the part is known best, m in O.
+    /// - `registered_at`: point of the most certain registration, m in O.
     pub fn drawn(self, registered_at: Point3<f64>, seed: u64) -> ArmErrors {
         match self {
             Self::None | Self::Bent => ArmErrors::NONE,
@@ -32,7 +32,7 @@ impl ArmErrorsName {
         }
     }
 
-    /// Has happen to a simulated arm what happens while it works.
+    /// Schedules the faults of this model in a simulated arm.
     pub fn befall(self, arm: &mut SimArm) {
         if self == Self::Bent {
             let (contacts, by) = BEND;

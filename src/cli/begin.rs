@@ -1,14 +1,14 @@
-//! Why a node does not begin, where an operator may mend it.
+//! Start-up errors of the node that an operator can mend.
 
 use super::CliError;
 use crate::ros::node::NodeError;
 
-/// Why a node does not begin.
+/// Start-up error of the node.
 #[derive(Debug)]
 pub(super) enum BeginError {
-    /// it cannot be made ready
+    /// Node setup.
     Node(NodeError),
-    /// its network or its arm
+    /// Network or arm.
     Around(CliError),
 }
 

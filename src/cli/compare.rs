@@ -1,4 +1,4 @@
-//! `touchup compare`: how far a mesh is from the true part.
+//! `touchup compare`: deviation of a mesh from the true part.
 
 mod alignment;
 mod table;
@@ -28,18 +28,18 @@ use crate::threads::Threads;
 /// Tolerance in the picture of a folder, mm: medium of ISO 2768-1 for lengths of up to 6 mm.
 const TOLERANCE_MM: f64 = 0.1;
 
-/// Points spread over the truth, unless more or fewer are wanted.
+/// Default number of sample points on the truth.
 const SAMPLES: u32 = 200_000;
 
 #[derive(Debug, Default, Args)]
 pub(super) struct CompareArguments {
-    /// The mesh to be judged: PLY, STL or OBJ, or a point cloud: PLY, PCD, XYZ or E57; of a refined
-    /// PLY touched and untouched parts are listed apart
+    /// Mesh (PLY, STL, OBJ) or point cloud (PLY, PCD, XYZ, E57) to compare; touched and untouched
+    /// parts of a refined PLY get rows of their own
     mesh: PathBuf,
     /// The nominal or true part: PLY, STL or OBJ
     truth: PathBuf,
-    /// With --align pairs: the same points on MESH (columns scan_x_mm …) and on TRUTH (space_x_mm
-    /// …), as CSV
+    /// With --align pairs: the same points on MESH (columns scan_x_mm and so on) and on TRUTH
+    /// (space_x_mm and so on), as CSV
     #[arg(value_name = "PAIRS")]
     pairs: Option<PathBuf>,
     /// Unit of the coordinates in MESH, and in the mesh of --before
@@ -48,37 +48,36 @@ pub(super) struct CompareArguments {
     /// Unit of the coordinates in TRUTH
     #[arg(long, value_name = "U", default_value = "mm")]
     truth_unit: MeshUnit,
-    /// The scan before it was refined, in the frame of MESH: compared beside it
+    /// The scan before its refinement, in the frame of MESH: compared beside it
     #[arg(long, value_name = "MESH")]
     before: Option<PathBuf>,
-    /// How MESH is brought onto TRUTH
+    /// Alignment of MESH to TRUTH
     #[arg(long, value_name = "HOW", default_value = "none")]
     align: Align,
-    /// Which of several motions, where --align features found more than one
+    /// Number of the motion to use, if --align features finds several
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u16).range(1..))]
     alternative: Option<u16>,
-    /// Writes a picture of MESH in the colours of its deviation
+    /// Writes a picture of MESH, coloured by deviation
     #[arg(long, value_name = "PNG")]
     picture: Option<PathBuf>,
     /// Writes MESH with these colours and the column `deviation_mm`, in its own frame and unit
     #[arg(long, value_name = "PLY")]
     coloured: Option<PathBuf>,
-    /// Ends of the colours and of the histogram, mm; by default from the 95th percentile
+    /// Ends of the colours and of the histogram, mm; default: from the 95th percentile
     #[arg(long, value_name = "R", value_parser = positive)]
     range_mm: Option<f64>,
-    /// Deviations of at most this are within tolerance: their share is listed, and the picture has
-    /// one colour for them
+    /// Tolerance for the deviations: lists the share within it, and gives it one colour in the
+    /// picture
     #[arg(long, value_name = "T", value_parser = positive)]
     tolerance_mm: Option<f64>,
-    /// Names the holes, slots, pockets and bosses of this file in the picture; it is in the frame
-    /// of MESH, as `refine` writes it
+    /// Features to name in the picture (holes, slots, pockets, bosses), in the frame of MESH, as
+    /// `refine` writes them
     #[arg(long, value_name = "JSON", requires = "picture")]
     features: Option<PathBuf>,
-    /// Named in the picture beside those
+    /// Further features to name in the picture.
     #[arg(skip)]
     named: Vec<FeatureRecord>,
-    /// From which direction the picture is taken, in the frame of TRUTH; by default the side that
-    /// was touched
+    /// View direction of the picture, in the frame of TRUTH; default: the touched side
     #[arg(
         long,
         value_name = "X,Y,Z",
@@ -87,10 +86,10 @@ pub(super) struct CompareArguments {
         allow_negative_numbers = true
     )]
     view: Option<Vec<f64>>,
-    /// Points spread over TRUTH; over MESH they are as dense
+    /// Number of points spread over TRUTH; MESH gets the same density
     #[arg(long, value_name = "N", default_value_t = SAMPLES, value_parser = clap::value_parser!(u32).range(100..=5_000_000))]
     samples: u32,
-    /// Another seed spreads them differently
+    /// Seed of the spread points
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
     /// Also prints the sizes of both, the table of all distances, and the points of the alignment
@@ -101,21 +100,21 @@ pub(super) struct CompareArguments {
     json: bool,
 }
 
-/// How the mesh is brought onto the truth.
+/// Method of aligning the mesh to the truth.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 enum Align {
     /// MESH is already aligned
     #[default]
     None,
-    /// From about the right place, point to plane
+    /// Point to plane, from roughly the right place
     Icp,
     /// From anywhere, by holes, slots, corners and planes, then point to plane
     Features,
-    /// By points picked on both, in the file PAIRS
+    /// By picked point pairs, in the file PAIRS
     Pairs,
 }
 
-/// A mesh that was read, brought into the frame of the truth.
+/// Mesh in the frame of the truth, with its tree.
 struct PlacedMesh {
     mesh: TriMesh,
     tree: FaceTree,
@@ -137,7 +136,7 @@ impl PlacedMesh {
     }
 }
 
-/// The command: compares, and prints the result.
+/// Runs `touchup compare`: compares, and prints the result.
 pub(super) fn compare(arguments: &CompareArguments) -> Result<Losses, CliError> {
     let report = compared(arguments)?;
     print_report(arguments.json, &report, || match arguments.verbose {
@@ -239,10 +238,10 @@ pub(super) fn compared(arguments: &CompareArguments) -> Result<CompareReport, Cl
 }
 
 impl CompareArguments {
-    /// The picture deviation.png of refined.ply and scan.ply beside truth.ply in one folder, all in
-    /// mm.
+    /// Arguments for the picture deviation.png of refined.ply and scan.ply beside truth.ply in one
+    /// folder, all in mm.
     ///
-    /// - `named`: features whose names are written beside them.
+    /// - `named`: features to label in the picture.
     pub(super) fn in_folder(folder: &Path, named: Vec<FeatureRecord>) -> Self {
         let [mesh, truth] = ["refined.ply", "truth.ply"].map(|name| folder.join(name));
         let [before, picture] = ["scan.ply", "deviation.png"].map(|name| Some(folder.join(name)));
@@ -260,7 +259,7 @@ impl CompareArguments {
         }
     }
 
-    /// Compares what the mesh was before, where there is that, and the mesh, in one range.
+    /// Compares the scan before, if any, and the mesh, in one range.
     fn measure(
         &self,
         mesh: &PlacedMesh,
@@ -285,7 +284,7 @@ impl CompareArguments {
             compare_shapes(scan.shape(), truth.shape(), through, &params, &Threads)
         };
         let before = before.map(compared).transpose()?;
-        // the scale of what was shows how much better it is
+        // one scale for both shows the improvement
         let params = CompareParams {
             range: before.as_ref().map(|before| before.range).or(range),
             ..params
@@ -299,7 +298,7 @@ impl CompareArguments {
 
     /// Draws the deviations.
     ///
-    /// - `regions`: of each vertex slot of the mesh.
+    /// - `regions`: one per vertex slot of the mesh.
     fn draw(
         &self,
         path: &Path,
@@ -365,7 +364,7 @@ impl CompareArguments {
         write_picture(path, &panels, &params)
     }
 
-    /// The names of the features with their sizes, where the alignment brings them.
+    /// Labels of the features with their sizes, after the alignment.
     fn feature_labels(&self, pose: &Isometry3<f64>) -> Result<Vec<PictureLabel>, CliError> {
         let read = self
             .features
@@ -420,7 +419,7 @@ impl CompareArguments {
         )
     }
 
-    /// Checks that the result can be written before the work begins.
+    /// Checks the outputs before the work begins.
     fn check_outputs(&self) -> Result<(), CliError> {
         let outputs = [
             ("--picture", ".png", &self.picture),
@@ -466,7 +465,7 @@ fn read_regions(
     Ok((regions.len() == mesh.vertex_slots()).then_some(regions))
 }
 
-/// What to do where two shapes hardly show one part in one frame.
+/// Advice if two shapes hardly show one part in one frame.
 fn advice_on(
     unlike: UnlikeExtents,
     [mesh_unit, truth_unit]: [MeshUnit; 2],

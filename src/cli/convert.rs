@@ -1,5 +1,5 @@
-//! `touchup convert`: poses and wrenches of any recording, as a recording that every verb reads
-//! without flags; features and touches as tables.
+//! `touchup convert`: poses and wrenches of any recording as a recording for all verbs without
+//! flags; features and touches as tables.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -17,8 +17,8 @@ use crate::scene::Scene;
 
 #[derive(Debug, Args)]
 pub(super) struct ConvertArguments {
-    /// A recording: MCAP or SQLite of ROS 2, a file or a folder, a bag of ROS 1, or a table (CSV,
-    /// log of a UR's RTDE); or features.json or touches.csv of touchup
+    /// Recording: MCAP or SQLite of ROS 2 (file or folder), bag of ROS 1, or table (CSV, log of a
+    /// UR's RTDE); or features.json or touches.csv of touchup
     #[arg(value_name = "INPUT")]
     input: PathBuf,
     /// Output: .mcap of a recording, with /stylus/pose and /stylus/wrench; .csv or .parquet of
@@ -30,8 +30,7 @@ pub(super) struct ConvertArguments {
     scene: Option<PathBuf>,
     #[command(flatten)]
     recorded: RecordedFlags,
-    /// Which time of a message counts: that of its header, or when it was recorded, for headers
-    /// without a usable one
+    /// Time source of messages: their header, or their recording, for headers without a usable time
     #[arg(long, value_name = "S", default_value = "header")]
     stamp: StampSource,
     /// Prints the counts as one JSON object
@@ -39,16 +38,16 @@ pub(super) struct ConvertArguments {
     json: bool,
 }
 
-/// What `--json` prints.
+/// Output of `--json`.
 #[derive(Debug, Serialize)]
 struct Converted {
-    /// poses, or frames of markers
+    /// Poses, or frames of markers.
     poses: u64,
     wrenches: u64,
     pose_frame: String,
     wrench_frame: String,
-    /// where the pose is taken from transforms: poses for which some were interpolated, and stamps
-    /// that they do not cover
+    /// For poses from transforms: poses with an interpolated transform, and stamps without
+    /// coverage.
     #[serde(skip_serializing_if = "Option::is_none")]
     transforms: Option<TransformCounts>,
     out: PathBuf,
@@ -90,7 +89,7 @@ impl fmt::Display for Converted {
     }
 }
 
-/// The command: reads, writes and counts.
+/// Runs `touchup convert`: reads, writes and counts.
 pub(super) fn convert(arguments: &ConvertArguments) -> Result<Losses, CliError> {
     let ConvertArguments {
         input,
@@ -148,14 +147,14 @@ pub(super) fn convert(arguments: &ConvertArguments) -> Result<Losses, CliError> 
     Ok(losses)
 }
 
-/// What `--json` prints of a table.
+/// Output of `--json` for a table.
 #[derive(Debug, Serialize)]
 struct ConvertedTable {
     rows: usize,
     out: PathBuf,
 }
 
-/// Features where the input is JSON, else touches.
+/// Converts features if the input is JSON, else touches.
 fn convert_results(input: &Path, out: &Path, json: bool) -> Result<Losses, CliError> {
     let are_features = input
         .extension()

@@ -1,5 +1,5 @@
-//! `touchup demo`: makes a plate, scans it badly, touches it, refines the scan, and says how much
-//! better it became and what was found on it.
+//! `touchup demo`: makes a plate, scans it badly, touches it, refines the scan, and prints the gain
+//! in accuracy and the features.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -49,10 +49,10 @@ pub(super) struct DemoArguments {
     /// deviation.png (all in mm) and summary.json
     #[arg(long, value_name = "DIR", default_value = "out")]
     out: PathBuf,
-    /// Another seed makes another scan and another path
+    /// Seed of the scan and the path
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// An arm touches instead of a hand: it probes the flagged features (probed.json, plan.png,
+    /// Probes the flagged features with an arm instead of a hand (probed.json, plan.png,
     /// touches.png)
     #[arg(long, value_name = "ARM")]
     robot: Option<RobotName>,
@@ -61,22 +61,22 @@ pub(super) struct DemoArguments {
     web: WebFlags,
 }
 
-/// What `summary.json` holds; lengths in mm.
+/// Content of `summary.json`; lengths in mm.
 #[derive(Debug, Serialize)]
 struct DemoSummary {
     scan: ScanErrors,
     touched_s: f64,
-    /// error inside the touched region of the scan
+    /// Error of the scan inside the touched region.
     before: RegionError,
-    /// and of the refined mesh
+    /// Error of the refined mesh inside the touched region.
     after: RegionError,
     refine: RefineSummary,
-    /// true features beside the found ones
+    /// True features beside the found ones.
     found: FoundTable,
 }
 
 reported! {
-    /// The scan as a whole against the part.
+    /// Errors of the whole scan against the part.
     struct ScanErrors, fn of(quality: &ScanQuality) {
         faces: usize = quality.faces,
         edge_median_mm: f64 = quality.edge_median * 1e3,
@@ -87,7 +87,7 @@ reported! {
     }
 }
 
-/// The touching as an operator sees it, live on the page.
+/// Runs the demo live on the operator page.
 #[cfg(any(feature = "ros", feature = "r2r"))]
 fn demo_on_page(
     web: &WebFlags,
@@ -107,7 +107,7 @@ fn demo_on_page(
         &Topics::default(),
         StampSource::Header,
     )?;
-    // the plate as it is: there the page can show how far off the scan was
+    // with the true plate the page can show the error of the scan
     let web = web.with_nominal(out.join("truth.ply"));
     let NodeEnd { folder, report } = on_page(&web, parameters, recording, None)?;
     print_result(&format!(
@@ -162,7 +162,7 @@ pub(super) fn demo(arguments: &DemoArguments) -> Result<Losses, CliError> {
     let Refined {
         summary, losses, ..
     } = files.refine(scene, told, RefinementOptions::default())?;
-    // measured is what was written
+    // measures the mesh as written
     let MeshFile { mesh: refined, .. } = read_mesh(&mesh_out, unit)?;
 
     let named = read_features(&features_out)?.features;
@@ -170,7 +170,7 @@ pub(super) fn demo(arguments: &DemoArguments) -> Result<Losses, CliError> {
     compared(&CompareArguments::in_folder(out, named))?;
 
     let _measuring = WorkProgress::stage("measure");
-    // the true contacts of the ball with the part
+    // true contacts of the ball with the part
     let contacts = touch.moments.iter().flat_map(|moment| &moment.contacts);
     let touched = TouchedRegion::of(contacts.map(|contact| contact.point));
     let demo = DemoSummary {
@@ -235,9 +235,9 @@ reported! {
     /// Distances between part and mesh in the touched region, mean and 95th percentile, mm.
     #[derive(Clone, Copy)]
     struct RegionError, fn of(touched: &TouchedRegion, part: &dyn Surface, mesh: &TriMesh) {
-        /// from the points that were touched to the mesh: what is missing
+        /// Missing surface: from the touched points to the mesh.
         part_to_mesh_mm: [f64; 2] = part_to_mesh_mm(touched, mesh),
-        /// from the mesh to the part, where its closest point belongs to the region: what is wrong
+        /// Wrong surface: from the mesh to its closest points on the part, inside the region.
         mesh_to_part_mm: [f64; 2] = measure_quality(mesh, part, |p| touched.is_near(&part.closest(p).point))
             .map_or([0.0; 2], |quality| [quality.mean * 1e3, quality.p95 * 1e3]),
     }

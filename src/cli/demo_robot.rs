@@ -1,5 +1,5 @@
-//! `touchup demo --robot sim`: a plate whose scan has lost its holes is probed by a simulated arm,
-//! from one click for each feature.
+//! `touchup demo --robot sim`: a simulated arm probes a plate with its holes missing from the scan,
+//! from one click per feature.
 
 use std::f64::consts::TAU;
 use std::fmt;
@@ -28,10 +28,9 @@ use crate::probing::arm::Arm;
 use crate::probing::execute::{Flag, Probed, Prober};
 use crate::sim::{Plate, ScannerParams, SimArm, TruthFeature, TruthShape, WithSpheres, scan};
 
-/// Its scene, written beside the other files …
+/// Scene of the demo, written beside the other files.
 const SCENE: &str = include_str!("../../config/probe.yaml");
-/// … with what is told of an arm that differs from it by errors of `ArmErrorSigmas::CALIBRATED`,
-/// and the record of its check.
+/// Scene lines of an arm with errors of `ArmErrorSigmas::CALIBRATED`, and the record of its check.
 const CALIBRATED: &str =
     "  # what is not known of arm and place of the part, and what its check found
   check: check.json
@@ -43,14 +42,14 @@ const CALIBRATED: &str =
   touch_sigma_mm: 0.03
   tolerance_mm: 0.12
 ";
-/// The line of the record in it.
+/// Line of the check record in `CALIBRATED`.
 const CHECK: &str = "  check: check.json\n";
-/// What it has in the place of these, of an arm without.
+/// Scene lines of an arm without errors, replaced by `CALIBRATED`.
 const PERFECT: &str = "  # it comes to a place with no error of its own
   touch_sigma_mm: 0.005
   tolerance_mm: 0.02
 ";
-/// A flat spot of the plate.
+/// Flat spot on the plate.
 const SPOT: Point3<f64> = Point3::new(45e-3, 9e-3, 12e-3);
 /// Spheres around the plate, centres and diameter, mm.
 const SPHERES: [[f64; 3]; 4] = [
@@ -60,15 +59,14 @@ const SPHERES: [[f64; 3]; 4] = [
     [30.0, 150.0, 60.0],
 ];
 const DIAMETER: f64 = 25.0;
-/// Uncertainties are printed with this coverage factor.
+/// Coverage factor of the printed uncertainties.
 const COVERAGE: f64 = 2.0;
-/// The triangles of the part are this near to it, m: what is probed on them differs from the
-/// drawing by no more than a touch does.
+/// Chord error of the part's triangles, m: it changes probing results by no more than a touch does.
 const CHORD_ERROR: f64 = 0.5e-6;
 /// Largest error of a click, m.
 const CLICK: f64 = 3e-3;
 
-/// What `summary.json` holds; lengths in mm.
+/// Content of `summary.json`; lengths in mm.
 #[derive(Debug, Serialize)]
 struct RobotSummary {
     check: CheckReport,
@@ -77,35 +75,35 @@ struct RobotSummary {
 }
 
 reported! {
-    /// Errors of the probed features; `found` is what was measured of one, if anything was.
+    /// Errors of a probed feature; `found`: its measurement, if any.
     struct ProbedError, fn of(flag: &Flag, truth: &TruthFeature, probed: Option<&Probed>, found: Option<&Feature>) {
         name: &'static str = truth.name,
-        /// error of the click
+        /// Error of the click.
         click_mm: f64 = (flag.place - truth.centre).xy().norm() * 1e3,
         touches: usize = probed.map_or(0, |probed| probed.touches.len()),
         duration_s: f64 = probed.map_or(0.0, |probed| probed.seconds),
         largest_force_n: f64 = probed.map_or(0.0, |probed| probed.peak_force),
-        /// across the axis, of the step across its edge
+        /// Across the axis, for a step across its edge.
         place_mm: Option<f64> = found.map(|found| place_error(found, truth) * 1e3),
-        /// of the diameter, or of the width and the length
+        /// Errors of the diameter, or of width and length.
         sizes_mm: Vec<f64> = numbers(found, truth).iter().map(|number| number.error_mm).collect(),
-        /// the place, and the numbers of `sizes_mm`
+        /// Place, and the numbers of `sizes_mm`.
         numbers: Vec<NumberError> = found.map(|found| place_number(found, truth)).into_iter().chain(numbers(found, truth)).collect(),
     }
 }
 
-/// A number beside what it truly is.
+/// Measured number beside its true value.
 #[derive(Debug, Serialize)]
 struct NumberError {
     number: &'static str,
-    /// of a place, where it is off
+    /// `None` for a place.
     #[serde(skip_serializing_if = "Option::is_none")]
     true_mm: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     found_mm: Option<f64>,
-    /// of a place, how far it is off
+    /// For a place: its distance from the true one.
     error_mm: f64,
-    /// twice the standard uncertainty
+    /// Twice the standard uncertainty.
     expanded_mm: f64,
 }
 
@@ -115,7 +113,7 @@ impl NumberError {
     }
 }
 
-/// - `seed`: of the scan, the clicks and the arm.
+/// - `seed`: for scan, clicks and arm.
 #[expect(clippy::too_many_lines)]
 pub(super) fn demo_robot(out: &Path, seed: u64) -> Result<Losses, CliError> {
     let plate = Plate::default();
@@ -138,7 +136,7 @@ pub(super) fn demo_robot(out: &Path, seed: u64) -> Result<Losses, CliError> {
         write_atomically(&scene_path, |file| file.write_all(text.as_bytes()))
             .map_err(not_written(&scene_path))
     };
-    // the record of another run says nothing of this arm
+    // a check record of another run is not valid for this arm
     write_scene(&scene.replace(CHECK, ""))?;
 
     let features = plate.features();
@@ -178,7 +176,7 @@ pub(super) fn demo_robot(out: &Path, seed: u64) -> Result<Losses, CliError> {
     let ready = probing.ready()?;
     let now = arm.next_state().map_err(CliError::arm)?;
     probing.planned(&ready, &now)?;
-    // nothing real moves: a signal ends it as any other verb
+    // nothing real moves: a signal ends this as any other verb
     let Done {
         summary,
         probed,
@@ -211,7 +209,7 @@ pub(super) fn demo_robot(out: &Path, seed: u64) -> Result<Losses, CliError> {
     outcome
 }
 
-/// A spot and all spheres are touched.
+/// Touches the spot and all spheres.
 fn checked(ready: &Ready, arm: &mut dyn Arm) -> Result<CheckReport, CliError> {
     let _checking = WorkProgress::stage("check");
     let mut world = ready.static_world()?;
@@ -230,7 +228,7 @@ fn feature_of(probed: &Probed) -> Option<&Feature> {
     probed.found.as_ref()?.feature.as_ref()
 }
 
-/// One click near a feature, as a person makes it: a kind, and no size.
+/// Click near a feature, as by a person: a kind, and no size.
 fn clicked(id: u32, feature: &TruthFeature, rng: &mut Pcg64) -> Flag {
     let (angle, off) = (rng.random_range(0.0..TAU), rng.random_range(0.0..CLICK));
     let top = if let TruthShape::Boss { height, .. } = feature.shape {
@@ -248,20 +246,20 @@ fn clicked(id: u32, feature: &TruthFeature, rng: &mut Pcg64) -> Flag {
     }
 }
 
-/// Error of the place in the directions that its uncertainty is of, m: across the axis, of the step
-/// across its edge.
+/// Error of the place in the directions of its uncertainty, m: across the axis, for a step across
+/// its edge.
 fn place_error(found: &Feature, truth: &TruthFeature) -> f64 {
     let off = found.centre.value - truth.centre;
     let along = match truth.shape {
-        // where along it the edge was touched is no error
+        // the touched position along the edge is no error
         TruthShape::Step { direction, .. } => direction,
-        // the features of the plate are perpendicular to its top
+        // features of the plate are perpendicular to its top
         _ => Vector3::z(),
     };
     (off - along * off.dot(&along)).norm()
 }
 
-/// Where it is off, and how far it may be.
+/// Error of the place, with its expanded uncertainty.
 fn place_number(found: &Feature, truth: &TruthFeature) -> NumberError {
     let expanded_mm = COVERAGE * found.centre.std.unwrap_or(f64::NAN) * 1e3;
     let error_mm = place_error(found, truth) * 1e3;
@@ -274,7 +272,7 @@ fn place_number(found: &Feature, truth: &TruthFeature) -> NumberError {
     }
 }
 
-/// The sizes against the drawing.
+/// Sizes against the drawing.
 fn numbers(found: Option<&Feature>, truth: &TruthFeature) -> Vec<NumberError> {
     let Some(found) = found else {
         return Vec::new();

@@ -1,5 +1,5 @@
-//! `touchup disagree`: where touch and scan disagree, and whether the scanner, the part or a touch
-//! is to blame.
+//! `touchup disagree`: regions with a scan/touch discrepancy, and its cause: scanner, part or
+//! touch.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -22,11 +22,11 @@ use crate::threads::Threads;
 
 #[derive(Debug, Args)]
 pub(super) struct DisagreeArguments {
-    /// The scan before refinement: PLY, STL or OBJ, or a point cloud: PLY, PCD, XYZ or E57
+    /// Scan before refinement: mesh (PLY, STL, OBJ) or point cloud (PLY, PCD, XYZ, E57)
     scan: PathBuf,
-    /// The refined mesh: a PLY of refine, which marks what was touched
+    /// Refined mesh: a PLY of refine, with touched vertices marked
     refined: PathBuf,
-    /// The touches, as refine --touches-out writes them
+    /// Touches, as from refine --touches-out
     #[arg(long, value_name = "CSV")]
     touches: PathBuf,
     /// Unit of the coordinates in SCAN and REFINED
@@ -35,13 +35,13 @@ pub(super) struct DisagreeArguments {
     /// Writes REFINED with the colours of its classes and the columns `disagreement_mm` and `class`
     #[arg(long, value_name = "PLY")]
     coloured: Option<PathBuf>,
-    /// The same of SCAN
+    /// Writes SCAN with the same colours and columns
     #[arg(long, value_name = "PLY")]
     coloured_scan: Option<PathBuf>,
-    /// Writes a picture of REFINED in the colours of its classes, and of its disagreement with SCAN
+    /// Writes a picture of REFINED, coloured by class, and by its disagreement with SCAN
     #[arg(long, value_name = "PNG")]
     picture: Option<PathBuf>,
-    /// From which direction the picture is taken; by default the side that was touched
+    /// View direction of the picture; default: the touched side
     #[arg(
         long,
         value_name = "X,Y,Z",
@@ -56,11 +56,11 @@ pub(super) struct DisagreeArguments {
 }
 
 reported! {
-    /// What `--json` prints.
+    /// Output of `--json`.
     struct DisagreeReport, fn of(found: &Disagreement) {
-        /// `null` where too little was touched to know how the scanner errs
+        /// `null` if the touched area is too small for an error model of the scanner.
         scanner: Option<ScannerReport> = found.scanner.as_ref().map(ScannerReport::of),
-        /// of the scan as a whole, taken off before places are judged
+        /// Rigid offset of the whole scan, subtracted before the classification.
         rigid_offset: Option<RigidOffsetReport> = found.rigid_offset.as_ref().map(RigidOffsetReport::of),
         classes: Vec<ClassReport> = Class::ALL.iter().enumerate().map(|(at, class)| ClassReport::of(found, at, class)).collect(),
         regions: Vec<DisagreementRow> = found.regions.iter().map(DisagreementRow::of).collect(),
@@ -70,7 +70,7 @@ reported! {
 
 reported! {
     struct ScannerReport, fn of(scanner: &Scanner) {
-        /// touch − scan where the scanner sees well: negative where the part looks too large
+        /// touch − scan on surface in good view of the scanner; negative: the scan is too large.
         offset_mm: f64 = scanner.offset * 1e3,
         noise_mm: f64 = scanner.noise * 1e3,
         correlation_mm: f64 = scanner.correlation * 1e3,
@@ -82,13 +82,13 @@ reported! {
 
 reported! {
     struct RigidOffsetReport, fn of(offset: &RigidOffset) {
-        /// would bring the scan onto the touches, at `center_mm`
+        /// Shift of the scan onto the touches, at `center_mm`.
         shift_mm: [f64; 3] = (offset.shift * 1e3).into(),
-        /// and rotation vector
+        /// Rotation vector.
         turn_deg: [f64; 3] = offset.turn.map(f64::to_degrees).into(),
-        /// standard deviation on each axis
+        /// Standard deviation on each axis.
         shift_std_mm: [f64; 3] = (offset.shift_sigma * 1e3).into(),
-        /// and about each
+        /// Standard deviation about each axis.
         turn_std_deg: [f64; 3] = offset.turn_sigma.map(f64::to_degrees).into(),
         center_mm: [f64; 3] = (offset.centre.coords * 1e3).into(),
     }
@@ -97,7 +97,7 @@ reported! {
 reported! {
     struct ClassReport, fn of(found: &Disagreement, at: usize, known: &Class) {
         class: &'static str = known.name(),
-        /// as in the column `class`
+        /// Number in the column `class`.
         number: usize = at,
         refined_mm2: f64 = found.refined.areas[at] * 1e6,
         scan_mm2: f64 = found.scan.areas[at] * 1e6,
@@ -129,7 +129,7 @@ reported! {
     }
 }
 
-/// The command: finds, and prints the result.
+/// Runs `touchup disagree`: finds, and prints the result.
 pub(super) fn disagree(arguments: &DisagreeArguments) -> Result<Losses, CliError> {
     arguments.check_outputs()?;
     let reading = WorkProgress::stage("read");
@@ -206,7 +206,7 @@ fn read_known(path: &Path, unit: MeshUnit, mesh: &TriMesh) -> Result<Vec<VertexB
 }
 
 impl DisagreeArguments {
-    /// Checks that the result can be written before the work begins.
+    /// Checks the outputs before the work begins.
     fn check_outputs(&self) -> Result<(), CliError> {
         let outputs = [
             ("--picture", ".png", &self.picture),
@@ -259,7 +259,7 @@ impl DisagreeArguments {
     }
 }
 
-/// Number of listed regions and bad touches; `--json` has all.
+/// Maximum number of listed regions and bad touches; `--json` has all.
 const MOST_LISTED: usize = 12;
 
 impl fmt::Display for DisagreeReport {

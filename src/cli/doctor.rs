@@ -1,4 +1,4 @@
-//! `touchup doctor`: what is wrong with a recording, before anything is made of it.
+//! `touchup doctor`: checks a recording against its scan.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -20,23 +20,22 @@ use crate::scan::read_scan;
 
 #[derive(Debug, Args)]
 pub(super) struct DoctorArguments {
-    /// The scan: PLY, STL or OBJ, or a point cloud: PLY, PCD, XYZ or E57
+    /// Scan: mesh (PLY, STL, OBJ) or point cloud (PLY, PCD, XYZ, E57)
     #[arg(value_name = "SCAN")]
     scan: PathBuf,
-    /// The touches: a ROS 2 recording, MCAP or SQLite, a file or a folder; a bag of ROS 1; or a
-    /// table (CSV, log of a UR's RTDE)
+    /// Recording of the touches: MCAP or SQLite of ROS 2 (file or folder), bag of ROS 1, or table
+    /// (CSV, log of a UR's RTDE)
     #[arg(value_name = "RECORDING")]
     recording: PathBuf,
     /// Unit of the coordinates in the scan's file
     #[arg(long, value_name = "U", default_value = "mm")]
     mesh_unit: MeshUnit,
-    /// Names tip, frames, thresholds and pairing; the flags below override it
+    /// Scene with tip, frames, thresholds and pairing; the flags below override it
     #[arg(long, value_name = "YAML")]
     scene: Option<PathBuf>,
     #[command(flatten)]
     recorded: RecordedFlags,
-    /// Which time of a message counts: that of its header, or when it was recorded, for headers
-    /// without a usable one
+    /// Time source of messages: their header, or their recording, for headers without a usable time
     #[arg(long, value_name = "S", default_value = "header")]
     stamp: StampSource,
     #[command(flatten)]
@@ -46,20 +45,20 @@ pub(super) struct DoctorArguments {
     json: bool,
 }
 
-/// What `--json` prints.
+/// Output of `--json`.
 #[derive(Debug, Serialize)]
 struct Diagnosis {
-    /// whether nothing is surely wrong
+    /// Whether no finding is sure.
     is_sound: bool,
-    /// what was told of tip and scan, and by what
+    /// Settings of tip and scan, and their sources.
     told: ToldNumbers,
-    /// what scene and recording say together of the clocks
+    /// Clock offset from scene and recording together.
     wrench_offset: Option<WrenchOffset>,
-    /// the surest first
+    /// Findings, surest first.
     findings: Vec<InputFinding>,
 }
 
-/// The numbers that were told, then a line for each finding.
+/// Settings, then a line for each finding.
 impl fmt::Display for Diagnosis {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}", self.told)?;
@@ -72,7 +71,7 @@ impl fmt::Display for Diagnosis {
     }
 }
 
-/// The command: replays, prints a line for each finding, and fails at a sure one.
+/// Runs `touchup doctor`: replays, prints a line for each finding, and fails at a sure one.
 pub(super) fn doctor(arguments: &DoctorArguments) -> Result<Losses, CliError> {
     let (scene, told) = arguments.told.scene(arguments.scene.as_deref())?;
     let scan = read_scan(&arguments.scan, arguments.mesh_unit)?.mesh;

@@ -1,5 +1,5 @@
-//! What a verb ends with: the losses of work that was done, or an error: one line of text, or one
-//! JSON object where `--json` is asked for.
+//! End of a verb: the losses of completed work, or an error as one line of text or, with `--json`,
+//! one JSON object.
 
 use std::error::Error;
 use std::ffi::OsString;
@@ -30,33 +30,33 @@ use crate::session::OutcomeError;
 use crate::sim::SimError;
 use crate::sweep::{SweepError, WhatIfError};
 
-/// Losses of work that was done; empty: none.
+/// Losses of completed work; empty: none.
 pub(super) type Losses = Vec<String>;
 
-/// Why a command ended with another exit code than 0, as `--json` prints it.
+/// Error of a command with an exit code other than 0, as in `--json`.
 #[derive(Debug, Serialize)]
 pub struct CliError {
-    /// what is wrong: `usage`, `scene`, `mesh`, `recording`, `not_written`, `losses`, …
+    /// Category, such as `usage`, `scene`, `mesh`, `recording`, `not_written` or `losses`.
     pub kind: &'static str,
-    /// in words, with values and units
+    /// Message with values and units.
     pub message: String,
-    /// what to do next, where the message does not say it
+    /// Remedy, unless in the message.
     pub hint: Option<&'static str>,
-    /// as `touchup --help` lists them
+    /// Exit code, as in `touchup --help`.
     pub exit_code: u8,
 }
 
-/// Kind and exit code of a result that is not there.
+/// Kind and exit code of a missing result.
 const NOT_WRITTEN: (&str, u8) = ("not_written", 1);
-/// Kind and exit code of an input that is not to be used.
+/// Kind and exit code of an unusable input.
 pub(super) const UNSOUND: (&str, u8) = ("input", 3);
-/// Kind and exit code of an arm that stopped.
+/// Kind and exit code of a stopped arm.
 const STOPPED: (&str, u8) = ("stopped", 5);
-/// Kind and exit code of work with an arm that a signal ended.
+/// Kind and exit code of arm work ended by a signal.
 pub(super) const INTERRUPTED: (&str, u8) = ("interrupted", 130);
 
 impl CliError {
-    /// - `cause`: where it is one of a room, in which a missing file may be the reason.
+    /// - `cause`: error of a room, possibly due to a missing file.
     pub fn new(
         (kind, exit_code): (&'static str, u8),
         message: impl Display,
@@ -90,17 +90,17 @@ impl CliError {
         }
     }
 
-    /// A well-formed flag with an impossible value.
+    /// Well-formed flag with an impossible value.
     pub fn usage(why: impl Display) -> Self {
         Self::new(("usage", 2), format!("{why}; see --help"), None)
     }
 
-    /// A mesh or recording that cannot be written.
+    /// Write failure of a mesh or recording.
     pub fn not_written(error: impl Error + 'static) -> Self {
         Self::new(NOT_WRITTEN, &error, Some(&error))
     }
 
-    /// A true part that cannot be read; it has a flag of its own.
+    /// Read failure of the true part, with its own unit flag.
     pub fn truth(error: ScanError) -> Self {
         Self::new(
             ("mesh", 3),
@@ -109,7 +109,7 @@ impl CliError {
         )
     }
 
-    /// What is wrong in a file of a calibration.
+    /// Fault in a file of a calibration.
     pub fn calibration(path: &Path, error: impl Display) -> Self {
         Self::new(
             ("calibration", 3),
@@ -118,18 +118,18 @@ impl CliError {
         )
     }
 
-    /// What an arm, or its work, came to.
+    /// Failure of an arm or its work.
     pub fn arm(error: impl Display) -> Self {
         Self::new(("arm", 1), error, None)
     }
 
-    /// An arm that stays stopped.
+    /// Arm that stays stopped.
     #[cfg(feature = "ur")]
     pub fn stopped(error: impl Display) -> Self {
         Self::new(STOPPED, error, None)
     }
 
-    /// How the work of an arm ended before it was done.
+    /// Premature end of an arm's work.
     pub fn ended(ending: &Ending) -> Self {
         match ending {
             Ending::Cancelled(request) => {
@@ -140,7 +140,7 @@ impl CliError {
         }
     }
 
-    /// The same error with more of what the user has to know.
+    /// The same error with further information.
     pub fn with(self, more: impl Display) -> Self {
         Self {
             message: one_line(&format!("{}; {more}", self.message)),
@@ -148,7 +148,7 @@ impl CliError {
         }
     }
 
-    /// Why a feature cannot be probed.
+    /// Unplannable feature.
     pub fn plan(flag: u32, error: ExploreError) -> Self {
         Self::new(("plan", 2), format!("feature {flag}: {error}"), None)
     }
@@ -163,7 +163,7 @@ pub(super) fn require(is_allowed: bool, why: impl Display) -> Result<(), CliErro
     }
 }
 
-/// Refuses the value of a flag that is not above 0.
+/// Refuses a flag's value unless above 0.
 pub(super) fn require_positive(flag: &str, value: f64) -> Result<(), CliError> {
     require(
         value > 0.0 && value.is_finite(),
@@ -176,7 +176,7 @@ fn one_line(text: &str) -> String {
     text.lines().map(str::trim).collect::<Vec<_>>().join(" ")
 }
 
-/// Whether a command line, also one that cannot be parsed, asks for errors as JSON.
+/// Whether a command line, even a malformed one, asks for errors as JSON.
 pub(super) fn asks_for_json(arguments: &[OsString]) -> bool {
     arguments.iter().any(|word| word == "--json")
 }
@@ -194,7 +194,7 @@ pub(super) fn print_error(as_json: bool, error: &CliError) -> u8 {
     error.exit_code
 }
 
-/// Prints arguments that cannot be parsed, or the help or version that they ask for (exit code 0).
+/// Prints the error of malformed arguments, or the requested help or version (exit code 0).
 pub(super) fn print_parse_error(as_json: bool, error: &clap::Error) -> u8 {
     let exit_code = error.exit_code() as u8;
     if exit_code == 0 || !as_json {
@@ -220,7 +220,7 @@ pub(super) fn print_parse_error(as_json: bool, error: &clap::Error) -> u8 {
     )
 }
 
-/// The errors of the rooms: kind and exit code of each, and what its message begins with.
+/// Errors of the rooms: kind and exit code of each, and the beginning of its message.
 macro_rules! errors_of_rooms {
     ($($Error:ty => $kind_and_exit_code:expr, $before:literal;)*) => {$(
         impl From<$Error> for CliError {
@@ -234,7 +234,7 @@ macro_rules! errors_of_rooms {
 
 errors_of_rooms! {
     SceneError => |error| if matches!(error, SceneError::NoRadius) { ("usage", 2) } else { ("scene", 3) }, "";
-    // settings come from a scene file: its flags are checked before
+    // settings come from a scene file: flags are checked before
     crate::stylus::SettingError => |_| ("scene", 3), "";
     MeshFileError => |error| match error {
         MeshFileError::File(FileError::Write { .. }) => NOT_WRITTEN,
@@ -319,7 +319,7 @@ impl From<SpotError> for CliError {
 impl From<PayloadProbeError> for CliError {
     fn from(error: PayloadProbeError) -> Self {
         match &error {
-            // nothing is retracted from free air
+            // in free air the arm does not retract
             PayloadProbeError::Ended(Ending::Cancelled(_)) => Self::new(
                 INTERRUPTED,
                 "interrupted: the arm stopped in free air",

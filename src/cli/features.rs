@@ -1,5 +1,4 @@
-//! `touchup features`: a mesh in, and touches where there are any; its holes, slots, edges and
-//! planes out.
+//! `touchup features`: holes, slots, edges and planes of a mesh and its touches, if any.
 
 use std::iter;
 use std::path::PathBuf;
@@ -22,25 +21,25 @@ use crate::session::found;
 
 #[derive(Debug, Args)]
 pub(super) struct FeaturesArguments {
-    /// PLY, STL or OBJ, or a point cloud: PLY, PCD, XYZ or E57
+    /// Mesh (PLY, STL, OBJ) or point cloud (PLY, PCD, XYZ, E57)
     #[arg(value_name = "MESH")]
     mesh: PathBuf,
-    /// Unit of the coordinates in its file
+    /// Unit of the coordinates in MESH
     #[arg(long, value_name = "U", default_value = "mm")]
     mesh_unit: MeshUnit,
-    /// The touches, as refine --touches-out writes them
+    /// Touches, as from refine --touches-out
     #[arg(long, value_name = "CSV")]
     touches: Option<PathBuf>,
-    /// What is looked for
+    /// Kind of search
     #[arg(long, value_name = "MODE", default_value = "fitted")]
     mode: FeaturesMode,
     /// paper: number of clusters; default: estimated from the data
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     clusters: Option<u32>,
-    /// paper: vertices of more Gaussian curvature than this belong to clusters, 1/mm²
+    /// paper: lower limit of the Gaussian curvature of cluster vertices, 1/mm²
     #[arg(long, value_name = "T", default_value_t = 0.3)]
     threshold_per_mm2: f64,
-    /// Output: the features: JSON, or a table, .csv or .parquet
+    /// Output: the features as JSON, or as a table, .csv or .parquet
     #[arg(long, value_name = "FEATURES")]
     out: Option<PathBuf>,
     /// Prints the features as JSON
@@ -51,13 +50,13 @@ pub(super) struct FeaturesArguments {
 /// Kind of search on a mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum FeaturesMode {
-    /// holes, slots, pockets, bosses, edges, corners and planes, fitted by least squares
+    /// Holes, slots, pockets, bosses, edges, corners and planes, fitted by least squares
     Fitted,
-    /// the paper's control points: clusters of high Gaussian curvature
+    /// Control points of the paper: clusters of high Gaussian curvature
     Paper,
 }
 
-/// The command: finds, and prints the result.
+/// Runs `touchup features`: finds, and prints the result.
 pub(super) fn features(arguments: &FeaturesArguments) -> Result<Losses, CliError> {
     arguments.check()?;
     if let Some(out) = &arguments.out {
@@ -98,7 +97,7 @@ pub(super) fn features(arguments: &FeaturesArguments) -> Result<Losses, CliError
 }
 
 impl FeaturesArguments {
-    /// Flags that do not go together.
+    /// Refuses incompatible flags.
     fn check(&self) -> Result<(), CliError> {
         let is_paper = self.mode == FeaturesMode::Paper;
         let is_above_0 = self.threshold_per_mm2 > 0.0 && self.threshold_per_mm2.is_finite();
@@ -192,7 +191,7 @@ fn feature_table(
     lines.join("\n")
 }
 
-/// Smallest share of the surface that gets a line.
+/// Smallest listed share of the surface.
 const NOTABLE: f64 = 0.05;
 
 fn count(features: &[Feature], kind: Kind) -> Option<String> {
@@ -252,7 +251,7 @@ fn size(feature: &Feature) -> String {
     parts.join(" ")
 }
 
-/// Smallest roundness of a drawing that is told, m: that of its rounding is none.
+/// Smallest listed roundness of a CAD mesh, m: smaller values are its rounding.
 const NOTABLE_FORM: f64 = 1e-6;
 
 fn with_std(measured: &Measured<f64>) -> String {

@@ -1,4 +1,4 @@
-//! Features that were found, beside those of a part that is known.
+//! Detected features beside those of a known part.
 
 use std::fmt;
 
@@ -11,10 +11,10 @@ use crate::io::features_file::FeatureRecord;
 use crate::sim::{TruthFeature, TruthShape};
 
 reported! {
-    /// A true feature and what was found of it; lengths in mm, angles in degrees.
+    /// True feature and its detection; lengths in mm, angles in degrees.
     pub(super) struct FoundFeature, fn of(truth: &TruthFeature, record: Option<&FeatureRecord>) {
         name: &'static str = truth.name,
-        /// its number in features.json; `null`: not found
+        /// Number in features.json; `null`: not found.
         id: Option<u32> = record.map(|record| record.id),
         numbers: Vec<FoundNumber> = numbers(truth, record),
         center_off_mm: Option<f64> = record.and_then(|record| off_mm(truth, record)),
@@ -23,33 +23,33 @@ reported! {
     }
 }
 
-/// A number of a drawing, and what was measured.
+/// Number of a drawing, and its measurement.
 #[derive(Debug, Serialize)]
 struct FoundNumber {
     name: &'static str,
     truth: f64,
     found: Option<f64>,
     std: Option<f64>,
-    /// of a depth whose floor was not touched
+    /// Whether this is a depth with an untouched floor.
     #[serde(skip)]
     is_lower_bound: bool,
 }
 
-/// All features of a part, and how many found ones are none of them.
+/// All features of a part, and the number of false detections.
 #[derive(Debug, Serialize)]
 pub(super) struct FoundTable {
     features: Vec<FoundFeature>,
-    /// holes, slots, pockets and bosses that the part does not have
+    /// Holes, slots, pockets and bosses that the part does not have.
     invented: usize,
 }
 
-/// A feature is found when its middle is within this of the true one, mm.
+/// Largest distance of a detected centre from the true one, mm.
 const NEAR_MM: f64 = 1.5;
-/// Those of a kind that a part of holes, slots and bosses should not have more of.
+/// Kinds for the count of false detections.
 const COUNTED: [&str; 4] = ["hole", "slot", "pocket", "boss"];
 
 impl FoundTable {
-    /// Looks for each true feature among the found ones.
+    /// Matches each true feature with the found ones.
     pub fn of(truth: &[TruthFeature], found: &[FeatureRecord]) -> Self {
         let features: Vec<_> = truth
             .iter()
@@ -67,7 +67,7 @@ impl FoundTable {
     }
 }
 
-/// The found feature that a true one is, if any.
+/// Nearest found feature of the same kind, if any.
 fn nearest<'a>(truth: &TruthFeature, found: &'a [FeatureRecord]) -> Option<&'a FeatureRecord> {
     let kind = kind_of(&truth.shape).name();
     let off = |record: &&FeatureRecord| off_mm(truth, record).unwrap_or(f64::INFINITY);
@@ -77,7 +77,7 @@ fn nearest<'a>(truth: &TruthFeature, found: &'a [FeatureRecord]) -> Option<&'a F
         .filter(|record| off(record) < NEAR_MM)
 }
 
-/// What the drawing says of a feature, beside what was found.
+/// Numbers of a feature on the drawing, beside the found ones.
 fn numbers(truth: &TruthFeature, record: Option<&FeatureRecord>) -> Vec<FoundNumber> {
     let number = |name, truth: f64, value: fn(&FeatureRecord) -> Option<f64>| {
         let std = record.and_then(|record| record.std.get(name).copied());
@@ -122,7 +122,7 @@ fn numbers(truth: &TruthFeature, record: Option<&FeatureRecord>) -> Vec<FoundNum
     }
 }
 
-/// What a true shape is found as.
+/// Detected kind of a true shape.
 pub(super) fn kind_of(shape: &TruthShape) -> Kind {
     match shape {
         TruthShape::Hole { .. } => Kind::Hole,
@@ -132,7 +132,7 @@ pub(super) fn kind_of(shape: &TruthShape) -> Kind {
     }
 }
 
-/// The direction that both should share.
+/// Common direction of both.
 fn axis_of(truth: &TruthFeature) -> Vector3<f64> {
     match truth.shape {
         TruthShape::Step { direction, .. } => direction,

@@ -1,4 +1,4 @@
-//! `touchup init`: a scene with every key explained, to be changed and given by --scene.
+//! `touchup init`: a scene with every key explained, to edit and to pass as --scene.
 
 use std::io::Write;
 use std::path::PathBuf;
@@ -12,20 +12,20 @@ use crate::scene::{Scene, Setting};
 
 #[derive(Debug, Args)]
 pub(super) struct InitArguments {
-    /// The scene to write; no file that is there is written over
+    /// Scene to write; an existing file is never overwritten
     #[arg(value_name = "YAML", default_value = "scene.yaml")]
     out: PathBuf,
     /// Radius of the ball, mm
     #[arg(long, value_name = "R", allow_negative_numbers = true)]
     tip_radius_mm: f64,
-    /// Stiffness of stylus and holder at the ball, N/mm; not given: 20
+    /// Stiffness of stylus and holder at the ball, N/mm; default: 20
     #[arg(long, value_name = "K", allow_negative_numbers = true)]
     stiffness_n_per_mm: Option<f64>,
-    /// Standard deviation of the scan from the true surface, mm; not given: 0.6
+    /// Standard deviation of the scan from the true surface, mm; default: 0.6
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     scan_noise_mm: Option<f64>,
-    /// The scan: PLY, STL or OBJ, or a point cloud: PLY, PCD, XYZ or E57; relative to the folder of
-    /// the scene
+    /// Scan: mesh (PLY, STL, OBJ) or point cloud (PLY, PCD, XYZ, E57); relative to the scene's
+    /// folder
     #[arg(long, value_name = "MESH")]
     scan: Option<PathBuf>,
     /// Unit of the coordinates in the scan's file
@@ -33,7 +33,7 @@ pub(super) struct InitArguments {
     mesh_unit: MeshUnit,
 }
 
-/// The command: writes the scene.
+/// Runs `touchup init`: writes the scene.
 pub(super) fn init(arguments: &InitArguments) -> Result<Losses, CliError> {
     let InitArguments {
         out,

@@ -1,9 +1,8 @@
-//! The command line: one file for each verb.
+//! Command line: one file for each verb.
 //!
-//! Results go to stdout, everything else to stderr. Exit codes, which other tools rely on: 0 done,
-//! 1 the result could not be written, 2 wrong usage, 3 bad input file, 4 done with losses, which
-//! are named, 5 the arm stopped, 130 a signal stopped it. With `--json` an error is one object on
-//! stderr.
+//! Results go to stdout, everything else to stderr. Exit codes, relied upon by other tools: 0 done,
+//! 1 result not written, 2 wrong usage, 3 bad input file, 4 done with losses, which are named, 5
+//! the arm stopped, 130 stopped by a signal. With `--json` an error is one object on stderr.
 
 mod arm;
 mod arm_errors;
@@ -114,23 +113,24 @@ enum Verb {
     Calibrate(calibrate::CalibrateArguments),
     /// Makes a plate, scans it badly, touches it and refines the scan: needs no input
     Demo(demo::DemoArguments),
-    /// Measures how far a mesh is from the true part, in numbers and as a picture
+    /// Measures the deviation of a mesh from the true part, in numbers and as a picture
     Compare(compare::CompareArguments),
-    /// Makes an MCAP recording with poses and wrenches of any recording that can be read
+    /// Converts any readable recording to MCAP, with poses and wrenches; features and touches to
+    /// tables
     Convert(convert::ConvertArguments),
-    /// Finds where touch and scan disagree, and whether scanner, part or touch is to blame
+    /// Locates discrepancies between scan and touches, and names the cause: scanner, part or touch
     Disagree(disagree::DisagreeArguments),
-    /// Doubts a recording: sign, axes, units, tare, stamps, clock and frames, against the scan that
-    /// it touched
+    /// Checks a recording against its scan: force sign, axes, units, tare, time stamps, clocks,
+    /// frames
     Doctor(doctor::DoctorArguments),
     /// Writes a scene with every key explained
     Init(init::InitArguments),
     /// Refines a scan by a recording of touches
     Refine(refine::RefineArguments),
-    /// Finds holes, slots, pockets, bosses, edges, corners and planes on a mesh, and measures them
+    /// Detects and measures holes, slots, pockets, bosses, edges, corners and planes on a mesh
     Features(features::FeaturesArguments),
-    /// Inspects measured features against a drawing: pass, fail or undecided, and a report that
-    /// prints
+    /// Inspects measured features against a drawing: pass, fail or undecided, with a printable
+    /// report
     Inspect(inspect::InspectArguments),
     /// Probes flagged features with an arm
     #[command(after_help = ARM_SIGNALS)]
@@ -138,18 +138,17 @@ enum Verb {
     /// Checks the repeatability of an arm on one spot
     #[command(after_help = ARM_SIGNALS)]
     Check(check::CheckArguments),
-    /// Lets an arm that was stopped move again, once somebody has looked; nothing moves
+    /// Acknowledges the stop of an arm after inspection, so that it can move again; nothing moves
     Recover(recover::RecoverArguments),
     /// Scans and touches a known part: makes the input of refine
     Simulate(simulate::SimulateArguments),
-    /// Refines many recordings with many settings: plans jobs, runs them, and makes a table of what
-    /// came of them
+    /// Refines many recordings with many settings: plans jobs, runs them, and tabulates the results
     #[command(subcommand)]
     Sweep(sweep::SweepArguments),
-    /// Says what moved between two results of a sweep by more than its ±
+    /// Lists the differences between two results of a sweep beyond their ±
     Whatif(whatif::WhatIfArguments),
     /// Measures error against run time, stability and cost on this machine: runs `touchup-report`,
-    /// a program of its own
+    /// a separate program
     #[command(disable_help_flag = true)]
     Report(report::HandedOver),
     /// Refines a scan live, as a ROS 2 node
@@ -160,14 +159,13 @@ enum Verb {
     #[cfg(any(feature = "ros", feature = "r2r"))]
     #[command(after_help = ROS_ARGUMENTS)]
     Replay(replay::ReplayArguments),
-    /// Answers one held sample per JSON line on stdin, so that other implementations can be
-    /// compared
+    /// Answers one held sample per JSON line on stdin, for comparison with other implementations
     #[command(after_help = STEP_FIELDS)]
     Step,
-    /// Prints what a shell needs to complete commands and flags: touchup completions bash >
+    /// Prints the completion script of a shell: touchup completions bash >
     /// ~/.local/share/bash-completion/completions/touchup
     Completions {
-        /// Which shell
+        /// Name of the shell
         shell: clap_complete::Shell,
     },
     /// Prints a man page: touchup man | man -l -
@@ -178,12 +176,12 @@ enum Verb {
     Ur(ur::UrArguments),
 }
 
-/// Runs the verb that `arguments` name, the program's own name first.
+/// Runs the verb in `arguments`, after the program's name.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     exit_code(arguments).into()
 }
 
-/// The same for a program that is not ours, as the Python package: the exit code as a number.
+/// As [`run`], with the exit code as a number, for other programs, as the Python package.
 pub fn exit_code(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let (arguments, ros) = split(arguments);
     let as_json = asks_for_json(&arguments);
@@ -252,7 +250,7 @@ impl Verb {
         }
     }
 
-    /// Whether it is a node.
+    /// Whether the verb is a node.
     fn takes_ros_arguments(&self) -> bool {
         #[cfg(any(feature = "ros", feature = "r2r"))]
         return matches!(self, Self::Node(_) | Self::Replay(_));
@@ -261,7 +259,7 @@ impl Verb {
     }
 }
 
-/// Arguments behind `--ros-args`, for the verbs that take it.
+/// Arguments behind `--ros-args`, for verbs that accept them.
 fn ros_arguments(verb: &Verb, given: Vec<OsString>) -> Result<Vec<String>, CliError> {
     let is_allowed = given.is_empty() || verb.takes_ros_arguments();
     require(is_allowed, "--ros-args is for the verbs node and replay")?;
@@ -280,7 +278,7 @@ fn ros_arguments(verb: &Verb, given: Vec<OsString>) -> Result<Vec<String>, CliEr
         .collect()
 }
 
-/// The default log filter: that of `--log-level` behind `--ros-args`, else warnings.
+/// Default log filter: from `--log-level` behind `--ros-args`, else warnings.
 pub fn log_filter(arguments: &[OsString]) -> Targets {
     let (_, ros) = split(arguments);
     // the last one counts
@@ -291,15 +289,15 @@ pub fn log_filter(arguments: &[OsString]) -> Targets {
     let level = level
         .and_then(|level| log_level(level).ok()?.parse().ok())
         .unwrap_or(LevelFilter::WARN);
-    // the libraries below say what is no matter of the user; the last three complain, whenever a
-    // node ends, about writers that have left the graph already, and that a group was joined for
-    // each network and is not left for all of them at once; and about a topic that turns to the
-    // type that others publish, which the node itself says
+    // messages of libraries below do not concern the user; the last three complain at a node's end
+    // about writers no longer in the graph, and about a group joined for each network but not left
+    // for all at once; and about a topic that turns to the type of other publishers, which the node
+    // reports
     let libraries = [
         ("ros2_client", LevelFilter::ERROR),
-        // what it sends to /rosout is in the log already
+        // messages to /rosout are in the log already
         ("ros2_client::rosout", LevelFilter::OFF),
-        // it takes every distribution but that it was built for to be another one; the node checks
+        // it takes every distribution but its own for a mismatch; the node checks
         ("ros2_client::distributions", LevelFilter::OFF),
         ("rustdds", LevelFilter::ERROR),
         ("rustdds::dds::pubsub", LevelFilter::OFF),

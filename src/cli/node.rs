@@ -31,16 +31,16 @@ use crate::scene::Scene;
 
 #[derive(Debug, Args)]
 pub(super) struct NodeArguments {
-    /// Names the parts and their parameters, and the scan unless -p scan:=FILE does
+    /// Scene with the parts and their parameters, and the scan, unless -p scan:=FILE names it
     #[arg(long, value_name = "YAML")]
     scene: Option<PathBuf>,
-    /// Radius of the ball, mm; needed where no scene names it
+    /// Radius of the ball, mm; required if no scene has it
     #[arg(long, value_name = "R", allow_negative_numbers = true)]
     tip_radius_mm: Option<f64>,
     #[command(flatten)]
     web: WebFlags,
-    /// Where scans lie that can be chosen on the page when none is named, and where the page puts
-    /// scans and scene.yaml; default: the current folder
+    /// Folder of the scans on offer on the page if none is named, and of the page's scans and
+    /// scene.yaml; default: the current folder
     #[arg(long, value_name = "FOLDER", requires = "web")]
     web_scans: Option<PathBuf>,
     /// Prints the report of the session as one JSON object
@@ -48,7 +48,7 @@ pub(super) struct NodeArguments {
     json: bool,
 }
 
-/// - `ros`: the arguments behind `--ros-args`.
+/// - `ros`: arguments behind `--ros-args`.
 pub(super) fn node(arguments: &NodeArguments, ros: &[String]) -> Result<Losses, CliError> {
     let mut config = NodeConfig::new(ros, |name| std::env::var(name).ok())?;
     arguments.set_scene(&mut config)?;
@@ -98,7 +98,7 @@ pub(super) fn node(arguments: &NodeArguments, ros: &[String]) -> Result<Losses, 
     Ok(losses(&report))
 }
 
-/// A node that has its network and its arm.
+/// Node with its network and its arm.
 struct Begun {
     ready: Prepared,
     nominal: Option<TriMesh>,
@@ -108,7 +108,7 @@ struct Begun {
     arm: Option<ArmOfNode>,
 }
 
-/// The arm that the parameter `robot` asks for, with its own place on the network.
+/// Arm for the parameter `robot`, with its own node on the network.
 fn arm_of(config: &NodeConfig, scene: &Scene) -> Result<Option<ArmOfNode>, CliError> {
     let robot = config.parameters.string("robot");
     if robot == "none" {
@@ -140,18 +140,18 @@ fn arm_of(config: &NodeConfig, scene: &Scene) -> Result<Option<ArmOfNode>, CliEr
 }
 
 impl NodeArguments {
-    /// All that may go wrong before a node is there, so that an operator can mend it and begin
+    /// Fallible steps before the node exists, so that an operator can mend a failure and begin
     /// anew.
     fn begin(&self, config: &NodeConfig, signals: &SignalledNode) -> Result<Begun, BeginError> {
         let ready = Prepared::new(config.parameters.clone())?;
         let (inbox, arrivals) = inbox(INBOX, &Clock::system());
         signals.set(Some(inbox.clone()));
         let begun = self.around(config, ready, inbox, arrivals);
-        // nobody waits for a node that is not there
+        // without a node a signal ends the program at once
         Ok(begun.inspect_err(|_| signals.set(None))?)
     }
 
-    /// The network and the arm of a node that is ready.
+    /// Network and arm of a prepared node.
     fn around(
         &self,
         config: &NodeConfig,
@@ -184,14 +184,14 @@ impl NodeArguments {
         })
     }
 
-    /// What the mesh will depend on, and who told it.
+    /// Settings that determine the mesh, and their sources.
     fn told(&self, config: &NodeConfig, ready: &Prepared) -> ToldNumbers {
         let is_set = config.parameters.double("tip_radius_mm") > 0.0;
         let by_flag = self.tip_radius_mm.filter(|_| is_set);
         let radius_by = by_flag
             .map(|_| ToldBy::Flag)
             .or(is_set.then_some(ToldBy::Parameter));
-        // without a scene the defaults are nobody's word
+        // without a scene the defaults have no source
         let yaml = if config.parameters.string("scene").is_empty() {
             ""
         } else {
@@ -200,7 +200,7 @@ impl NodeArguments {
         ToldNumbers::of(ready.scene(), yaml, [radius_by, None, None])
     }
 
-    /// The flag overrides files of parameters, which may name a scene for every node.
+    /// Sets the scene of the flag, in place of a parameter file's scene for every node.
     fn set_scene(&self, config: &mut NodeConfig) -> Result<(), CliError> {
         let Some(scene) = &self.scene else {
             return Ok(());

@@ -1,4 +1,4 @@
-//! What the verbs write: results on stdout, files, and the checks of their places before the work
+//! Output of the verbs: results on stdout, files, and checks of output paths before the work
 //! begins.
 
 use std::collections::BTreeMap;
@@ -11,8 +11,7 @@ use super::error::{CliError, require};
 use crate::io::atomic::{AtomicFile, is_same_file, write_atomically};
 use crate::io::file_error::FileError;
 
-/// One line, or several, on stdout: whole, or an error. A reader that has gone away wants no more
-/// and is none.
+/// Prints one or more lines on stdout, whole, or returns an error; a closed pipe is none.
 pub(super) fn print_result(text: &str) -> Result<(), CliError> {
     let mut out = stdout().lock();
     match writeln!(out, "{text}").and_then(|()| out.flush()) {
@@ -21,7 +20,7 @@ pub(super) fn print_result(text: &str) -> Result<(), CliError> {
     }
 }
 
-/// A result as one JSON object, or in words.
+/// Prints a result as one JSON object, or in words.
 pub(super) fn print_report(
     as_json: bool,
     report: &impl Serialize,
@@ -45,12 +44,12 @@ pub(super) fn by_reason(counts: &BTreeMap<String, u64>) -> String {
     }
 }
 
-/// One line on stderr that is no error.
+/// Prints one line on stderr that is no error.
 pub(super) fn notify(line: &str) {
     let _ = writeln!(io::stderr(), "touchup: {}", line.replace('\n', " "));
 }
 
-/// … and below it the lines of a QR code, which are dark on light whatever colours a terminal has.
+/// As [`notify`], with the lines of a QR code below, dark on light in a terminal of any colours.
 pub(super) fn notify_with_code(line: &str, code: &str) {
     notify(line);
     let mut err = io::stderr().lock();
@@ -62,7 +61,7 @@ pub(super) fn notify_with_code(line: &str, code: &str) {
     let _ = err.write_all(lines.collect::<String>().as_bytes());
 }
 
-/// Makes the error of a file or folder that cannot be written.
+/// Error constructor for a file or folder with a write failure.
 pub(super) fn not_written(path: &Path) -> impl FnOnce(io::Error) -> CliError {
     |source| {
         CliError::not_written(FileError::Write {
@@ -78,12 +77,12 @@ pub(super) fn write_json(path: &Path, report: &impl Serialize) -> Result<(), Cli
     write_atomically(path, |out| writeln!(out, "{text}")).map_err(not_written(path))
 }
 
-/// Refuses an output that would take the place of the input.
+/// Refuses a `--out` that would overwrite the input.
 pub(super) fn check_kept(flag: &str, input: &Path, output: &Path) -> Result<(), CliError> {
     check_kept_by("--out", flag, input, output)
 }
 
-/// … by the flag `by`.
+/// As [`check_kept`], for the output flag `by`.
 pub(super) fn check_kept_by(
     by: &str,
     flag: &str,
@@ -102,10 +101,10 @@ pub(super) fn check_place(path: &Path) -> Result<(), CliError> {
         .map_err(not_written(path))
 }
 
-/// Checks names and places of outputs.
+/// Checks names and paths of outputs.
 ///
 /// - `outputs`: flag, ending and path of each.
-/// - `inputs`: what none of them may write over, and `used`: what becomes of these.
+/// - `inputs`: files that no output may overwrite, and `used`: their use.
 pub(super) fn check_outputs(
     outputs: &[(&str, &str, &Option<PathBuf>)],
     inputs: &[Option<&PathBuf>],

@@ -1,4 +1,4 @@
-//! A recording on the operator's page: a node without a network takes it as it would take a stylus.
+//! Recording on the operator page: a node without a network reads it like a stylus.
 
 use std::path::Path;
 use std::thread::{Builder, sleep};
@@ -18,11 +18,11 @@ use crate::ros::node::{INBOX, NodeEnd, NodeError, Prepared};
 use crate::ros::parameters::{ParameterValue, Parameters};
 use crate::stylus::MarkerFilter;
 
-/// Period of the look for a page.
+/// Polling period for an open page.
 const LOOK: Duration = Duration::from_millis(100);
 
-/// Plays a recording in real time as soon as a page is open; the node goes on until a signal ends
-/// it, so that what was found can be looked at and saved. What it leaves behind.
+/// Plays a recording in real time once a page is open; the node runs on until a signal, for viewing
+/// and saving the results. Returns the node's end.
 pub(super) fn on_page(
     web: &WebFlags,
     parameters: Parameters,
@@ -47,7 +47,7 @@ pub(super) fn on_page(
             Ok(_) => notify("the recording is at its end; Ctrl-C saves and ends the session"),
             Err(error) => notify(&error.message),
         }
-        // it is served until the program ends
+        // keeps the page served until the program ends
         page
     };
     let touching = Builder::new()
@@ -61,7 +61,7 @@ pub(super) fn on_page(
 
 /// Parameters of a node on a scan.
 ///
-/// - `sessions`: folder in which sessions lie.
+/// - `sessions`: folder for sessions.
 pub(super) fn parameters_of(
     scan: &Path,
     unit: MeshUnit,

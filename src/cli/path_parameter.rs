@@ -5,7 +5,7 @@ use std::path::Path;
 use super::CliError;
 use crate::ros::parameters::ParameterValue;
 
-/// A path as a parameter.
+/// Path as a parameter.
 pub(super) fn path(path: &Path) -> Result<ParameterValue, CliError> {
     let why = || {
         CliError::usage(format!(

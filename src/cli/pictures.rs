@@ -1,4 +1,4 @@
-//! What the verbs that draw have in common.
+//! Common functions of the drawing verbs.
 
 use std::path::Path;
 use std::time::SystemTime;
@@ -13,20 +13,20 @@ use crate::io::mesh_file::{MeshUnit, VertexColumn, write_mesh_with};
 use crate::io::png::write_png;
 use crate::mesh::TriMesh;
 
-/// The date of the system clock (UTC), as pictures carry it.
+/// Date of the system clock (UTC), for pictures.
 pub(super) fn today() -> String {
     DateTime::<Utc>::from(SystemTime::now())
         .format("%Y-%m-%d")
         .to_string()
 }
 
-/// The last part of a path.
+/// Last part of a path.
 pub(super) fn file_name(path: &Path) -> String {
     path.file_name()
         .map_or(String::new(), |name| name.to_string_lossy().into_owned())
 }
 
-/// The direction that `--view` names.
+/// Direction of `--view`.
 pub(super) fn view_from(view: Option<&Vec<f64>>) -> Result<Option<Vector3<f64>>, CliError> {
     let is_direction =
         |view: &Vec<f64>| view.iter().all(|x| x.is_finite()) && view.iter().any(|x| *x != 0.0);

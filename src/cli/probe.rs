@@ -23,7 +23,7 @@ pub(super) struct ProbeArguments {
     /// The scene, with `robot` (config/probe.yaml is an example)
     #[arg(long, value_name = "YAML")]
     scene: PathBuf,
-    /// Features to probe, in the frame of the scan: KIND@X,Y,Z or KIND@X,Y,Z,RADIUS in mm; repeat
+    /// Feature to probe, in the frame of the scan: KIND@X,Y,Z or KIND@X,Y,Z,RADIUS in mm; repeat
     /// for each
     #[arg(
         long = "feature",
@@ -32,47 +32,46 @@ pub(super) struct ProbeArguments {
         allow_hyphen_values = true
     )]
     features: Vec<String>,
-    /// How far a feature may be from its flag, mm, where the flag does not say
+    /// Search radius around a flag without RADIUS, mm
     #[arg(long, value_name = "R", default_value_t = 3.0)]
     search_radius_mm: f64,
     /// Target half width of the confidence interval of each dimension, at the confidence of the
     /// scene, mm
     #[arg(long, value_name = "T")]
     tolerance_mm: Option<f64>,
-    /// Touches until each characteristic of a drawing passes or fails, in place of until a
-    /// dimension has a tolerance
+    /// Touches until each characteristic of a drawing passes or fails, instead of until a dimension
+    /// has a tolerance
     #[arg(long, value_name = "GOAL", value_parser = ["decided"], requires = "nominal", conflicts_with = "tolerance_mm")]
     until: Option<String>,
-    /// The drawing of --until decided: nominal values and tolerances, CSV or JSON (docs/inspect.md)
+    /// Drawing for --until decided: nominal values and tolerances, CSV or JSON (docs/inspect.md)
     #[arg(long, value_name = "FILE", requires = "until")]
     nominal: Option<PathBuf>,
-    /// Probability of conformity that a pass needs, and of nonconformity that a fail needs; of all
+    /// Minimum probability of conformity for a pass, and of nonconformity for a fail, over all
     /// looks together
     #[arg(long, value_name = "P", default_value_t = 0.95, requires = "until")]
     confidence: f64,
-    /// Most touches of a feature
+    /// Maximum number of touches of a feature
     #[arg(long, value_name = "N")]
     max_touches: Option<usize>,
-    /// Largest force at the tip, N: less than the scene allows
+    /// Largest force at the tip, N; at most as in the scene
     #[arg(long, value_name = "F")]
     max_force_n: Option<f64>,
-    /// Longest time for a feature, s: less than the scene allows
+    /// Longest time for a feature, s; at most as in the scene
     #[arg(long, value_name = "T")]
     max_duration_s: Option<f64>,
-    /// Temperature of the cell, °C: where the arm was checked at another, that stands in the
-    /// results; default: robot.temperature_c of the scene
+    /// Temperature of the cell, °C; the results state if the arm's check had another; default:
+    /// robot.temperature_c of the scene
     #[arg(long, value_name = "T", allow_hyphen_values = true)]
     temperature_c: Option<f64>,
-    /// Slides over the found feature with constant force, so that the mesh follows: along walls and
-    /// across rims
+    /// Slides along walls and across rims of the found feature with constant force, to refine the
+    /// mesh
     #[arg(long)]
     slide: bool,
-    /// Plans, checks reach and paths, and draws the plan, by the scene alone: no arm is asked, none
-    /// moves
+    /// Plans, checks reach and paths, and draws the plan by the scene alone: asks and moves no arm
     #[arg(long)]
     dry_run: bool,
-    /// Where the ball is when the plan of --dry-run begins, in the frame of the scan, mm; default:
-    /// 40 mm above the scan
+    /// Start of the ball in the plan of --dry-run, in the frame of the scan, mm; default: 40 mm
+    /// above the scan
     #[arg(
         long,
         value_name = "X,Y,Z",
@@ -80,12 +79,10 @@ pub(super) struct ProbeArguments {
         allow_hyphen_values = true
     )]
     from_mm: Option<String>,
-    /// Goes on with a probing that was broken off in the folder of --out: what is finished there is
-    /// not probed again
+    /// Continues an interrupted probing in the folder of --out: does not repeat finished features
     #[arg(long, conflicts_with = "dry_run")]
     resume: bool,
-    /// Writes mesh and features also where something of what the arm measured is surely wrong
-    /// (`touchup doctor`)
+    /// Writes mesh and features even if part of the arm's data is surely wrong (`touchup doctor`)
     #[arg(long, conflicts_with = "dry_run")]
     force: bool,
     /// Folder for plan.png, probing.json, probed_touches.jsonl, recording, probed.json,
@@ -134,7 +131,7 @@ impl ProbeArguments {
             .collect()
     }
 
-    /// A request can ask for less than the scene allows.
+    /// Narrows the scene's limits to the request.
     fn narrow(&self, ready: &mut Ready, flags: &[Flag]) -> Result<(), CliError> {
         if let Some(temperature_c) = self.temperature_c {
             ready.at_temperature(temperature_c)?;
@@ -176,7 +173,7 @@ impl ProbeArguments {
         Ok(())
     }
 
-    /// Plans with no arm at all: as from where `--from-mm` says.
+    /// Plans without an arm, from `--from-mm` on.
     fn plan_alone(&self, probing: &Probing<'_>, ready: &Ready) -> Result<Losses, CliError> {
         let from = self
             .from_mm
@@ -238,41 +235,41 @@ impl ProbeArguments {
     }
 }
 
-/// A decision depends on what is measured.
+/// Assumption of a plan with decisions, which depend on the measurements.
 const AS_SCANNED: &str = "the part is as the scan has it: a value nearer to its limits takes more touches until it is decided";
 
 reported! {
-    /// What `--dry-run --json` prints.
+    /// Output of `--dry-run --json`.
     struct DryRunReport, fn of(numbers: &ToldNumbers, flags: &[Flag], plans: &[Plan], start_mm: [f64; 3], decides: bool, drawn: PathBuf) {
-        /// what was told of tip and scan, and by what
+        /// Settings of tip and scan, and their sources.
         told: ToldNumbers = numbers.clone(),
-        /// centre of the ball where the plan begins, in the frame of the scan
+        /// Centre of the ball at the start of the plan, in the frame of the scan.
         from_mm: [f64; 3] = start_mm,
         features: Vec<PlannedFeature> =
             flags.iter().zip(plans).map(|(flag, plan)| PlannedFeature::of(flag.id, plan)).collect(),
-        /// what the plan takes for granted
+        /// Assumption of the plan.
         assumes?: &'static str = decides.then_some(AS_SCANNED),
         picture: PathBuf = drawn,
     }
 }
 
 reported! {
-    /// The plan for one flag.
+    /// Plan for one flag.
     struct PlannedFeature, fn of(id: u32, plan: &Plan) {
         flag: u32 = id,
         touches: usize = plan.touches.len(),
         unreachable_touches: Vec<Unreachable> = plan.held_back.iter().filter_map(Unreachable::touch).collect(),
-        /// places of the surface that are not touched, for the scan has no part there
+        /// Omitted places: the scan has no part there.
         beside_the_part_mm: Vec<[f64; 3]> = plan.left_out.iter().map(|place| (place * 1e3).coords.into()).collect(),
         slides: usize = plan.slides.len(),
         unreachable_slides: Vec<Unreachable> = plan.held_back.iter().filter_map(Unreachable::slide).collect(),
     }
 }
 
-/// A touch or slide that cannot be made.
+/// Infeasible touch or slide.
 #[derive(Debug, Serialize)]
 struct Unreachable {
-    /// counted from 0
+    /// Index from 0.
     number: usize,
     reason: String,
 }
@@ -299,7 +296,7 @@ impl Unreachable {
     }
 }
 
-/// The verdict, then each feature and what cannot be reached.
+/// Verdict, then each feature and its infeasible motions.
 impl fmt::Display for DryRunReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let sum =

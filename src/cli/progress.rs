@@ -1,16 +1,16 @@
-//! A bar for work that takes longer than a second: on stderr, and only when that is a terminal.
+//! Progress bar for work over a second: on stderr, and only on a terminal.
 
 use std::io::{IsTerminal, stderr};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-/// Work shorter than this shows nothing.
+/// Shorter work has no bar.
 const QUIET_FOR: Duration = Duration::from_secs(1);
-/// The clock is looked at once in this many steps.
+/// Number of steps between two looks at the clock.
 const STEPS_PER_LOOK: u64 = 1024;
 
-/// Counts steps; shows them once the work has taken a second. The bar vanishes when dropped.
+/// Counter of steps with a bar after the first second. The bar vanishes when dropped.
 #[derive(Debug)]
 pub struct WorkProgress {
     bar: ProgressBar,
@@ -20,7 +20,7 @@ pub struct WorkProgress {
 }
 
 impl WorkProgress {
-    /// `steps`: how many there will be, where that is known.
+    /// `steps`: their total number, if known.
     pub fn new(what: &'static str, steps: Option<u64>) -> Self {
         let bar = ProgressBar::with_draw_target(steps, ProgressDrawTarget::hidden());
         let template = match steps {
@@ -39,7 +39,7 @@ impl WorkProgress {
         }
     }
 
-    /// A stage that cannot say how far it is.
+    /// Stage without countable steps.
     pub fn stage(what: &'static str) -> Self {
         let mut stage = Self::new(what, None);
         if stage.waiting {
@@ -50,7 +50,7 @@ impl WorkProgress {
         stage
     }
 
-    /// One step is done.
+    /// Counts one step.
     #[inline]
     pub fn step(&mut self) {
         self.steps += 1;
@@ -59,7 +59,7 @@ impl WorkProgress {
         }
     }
 
-    /// One step of a few is done.
+    /// Counts one of few steps.
     pub fn step_now(&mut self) {
         self.steps += 1;
         self.look();

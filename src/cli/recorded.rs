@@ -1,5 +1,4 @@
-//! Where in a recording the poses and wrenches are, as flags name it: the same for every verb that
-//! reads one.
+//! Flags for poses and wrenches in a recording, common to all verbs with one.
 
 use clap::Args;
 
@@ -13,20 +12,19 @@ pub(super) struct RecordedFlags {
     /// /stylus/wrench]
     #[arg(long, value_name = "TOPIC")]
     wrench_topic: Option<String>,
-    /// geometry_msgs/PoseStamped or another pose: centre of the ball in the frame of the scan, or
-    /// as tip.offset_mm and scan_to_space in the scene say [default: /stylus/pose, with
-    /// --pose-frame /tf]
+    /// geometry_msgs/PoseStamped or another pose: ball centre in the frame of the scan, unless
+    /// tip.offset_mm and scan_to_space of the scene apply [default: /stylus/pose, with --pose-frame
+    /// /tf]
     #[arg(long, value_name = "TOPIC")]
     pose_topic: Option<String>,
-    /// The pose of this frame is taken from the transforms on --pose-topic and its _static, as that
-    /// of tool0
+    /// Frame with the pose, such as tool0, in the transforms on --pose-topic and its _static
     #[arg(long, value_name = "FRAME")]
     pose_frame: Option<String>,
-    /// With --pose-frame: the frame in which the pose is wanted [default: the root of the tree]
+    /// With --pose-frame: reference frame of the pose [default: the root of the tree]
     #[arg(long, value_name = "FRAME", requires = "pose_frame")]
     base_frame: Option<String>,
-    /// sensor_msgs/PointCloud2: the markers on the stylus, read in place of the pose; the scene
-    /// says where they sit
+    /// sensor_msgs/PointCloud2: markers on the stylus, in place of the pose; the scene has their
+    /// positions
     #[arg(long, value_name = "TOPIC", conflicts_with_all = ["pose_topic", "pose_frame"])]
     pub markers_topic: Option<String>,
 }
@@ -48,14 +46,14 @@ impl From<Topics> for RecordedFlags {
 }
 
 impl RecordedFlags {
-    /// What they name, and the scene of the columns of a table.
+    /// Layout from the flags, and from the scene for the columns of a table.
     pub fn layout(&self, scene: &Scene) -> RecordingLayout {
         self.named(StampSource::default()).layout(scene)
     }
 
-    /// The names that they give.
+    /// Names from the flags.
     ///
-    /// - `stamp`: which time of a message counts.
+    /// - `stamp`: time source of a message.
     pub fn named(&self, stamp: StampSource) -> RecordedAs {
         let Self {
             wrench_topic,

@@ -1,4 +1,4 @@
-//! `touchup recover`: an arm that was stopped may move again, once somebody has looked.
+//! `touchup recover`: clears the stop of an arm after inspection, so that it can move again.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -12,7 +12,7 @@ use crate::scene::Scene;
 
 #[derive(Debug, Args)]
 pub(super) struct RecoverArguments {
-    /// The scene, with `robot` of a UR (docs/ur.md)
+    /// Scene, with `robot` of a UR (docs/ur.md)
     #[arg(long, value_name = "YAML")]
     scene: PathBuf,
     /// Prints the result as one JSON object
@@ -28,11 +28,11 @@ pub(super) fn recover(arguments: &RecoverArguments) -> Result<Losses, CliError> 
 }
 
 reported! {
-    /// What `--json` prints.
+    /// Output of `--json`.
     struct Recovered, fn of(state: &ArmState) {
-        /// of the tip in the base of the arm
+        /// Position of the tip in the base of the arm.
         tip_mm: [f64; 3] = (state.pose_bt.translation.vector * 1e3).into(),
-        /// that the sensor feels, not zeroed yet
+        /// Force on the sensor, before taring.
         force_n: f64 = state.wrench_b.force.norm(),
     }
 }

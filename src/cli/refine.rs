@@ -28,12 +28,11 @@ use crate::session::{SessionRecord, StrokeChanges};
 
 #[derive(Clone, Debug, Default, Args)]
 pub(super) struct RefineArguments {
-    /// The scan: PLY, STL or OBJ, or a point cloud: PLY, PCD, XYZ or E57; not needed when the scene
-    /// names its file
+    /// Scan: mesh (PLY, STL, OBJ) or point cloud (PLY, PCD, XYZ, E57); default: the scene's file
     #[arg(long, value_name = "MESH", required_unless_present_any = ["resume", "scene"], default_value = "", value_parser = path_or_none())]
     scan: PathBuf,
-    /// The touches: a ROS 2 recording, MCAP or SQLite, a file or a folder; a bag of ROS 1; or a
-    /// table (CSV, log of a UR's RTDE)
+    /// Recording of the touches: MCAP or SQLite of ROS 2 (file or folder), bag of ROS 1, or table
+    /// (CSV, log of a UR's RTDE)
     #[arg(long, value_name = "RECORDING", required_unless_present = "resume", default_value = "", value_parser = path_or_none())]
     bag: PathBuf,
     /// Output: the refined mesh as PLY, STL or OBJ, in the unit of the scan
@@ -42,13 +41,12 @@ pub(super) struct RefineArguments {
     /// Unit of the coordinates in the scan's file
     #[arg(long, value_name = "U", default_value = "mm")]
     mesh_unit: MeshUnit,
-    /// Names the parts and their parameters; the flags below override it
+    /// Scene with the parts and their parameters; the flags below override it
     #[arg(long, value_name = "YAML")]
     scene: Option<PathBuf>,
     #[command(flatten)]
     recorded: RecordedFlags,
-    /// Which time of a message counts: that of its header, or when it was recorded, for headers
-    /// without a usable one
+    /// Time source of messages: their header, or their recording, for headers without a usable time
     #[arg(long, value_name = "S", default_value = "header")]
     stamp: StampSource,
     #[command(flatten)]
@@ -59,31 +57,29 @@ pub(super) struct RefineArguments {
     /// Also estimates the rigid offset of the scan from the touched part; the scan is not moved
     #[arg(long)]
     registration: bool,
-    /// Replays in real time with the patch beside it, as next to a stylus, and reports how far it
-    /// is behind; the result is the same
+    /// Replays in real time with the patch beside it, as next to a stylus, and reports its delay;
+    /// the result is the same
     #[arg(long)]
     live: bool,
-    /// With --live: the touching is shown on the operator's page while it is replayed, and what is
-    /// undone there is left out
+    /// With --live: shows the replay on the operator page, and leaves out strokes undone there
     #[cfg(any(feature = "ros", feature = "r2r"))]
     #[command(flatten)]
     web: WebFlags,
-    /// Output: the features of the refined mesh, measured by the touches: JSON, or a table, .csv or
+    /// Output: features of the refined mesh, measured by the touches: JSON, or a table, .csv or
     /// .parquet
     #[arg(long, value_name = "FEATURES")]
     features_out: Option<PathBuf>,
-    /// Output: the touches that features name: .csv or .parquet
+    /// Output: touches, which the features refer to: .csv or .parquet
     #[arg(long, value_name = "TOUCHES")]
     touches_out: Option<PathBuf>,
-    /// Folder of a session of the node: takes scan, scene and touches from there, also after a
-    /// crash, and writes refined.ply, features.json and touches.csv there unless they have places
-    /// of their own
+    /// Session folder of the node, even after a crash: source of scan, scene and touches, and
+    /// target of refined.ply, features.json and touches.csv unless these have paths of their own
     #[arg(long, value_name = "SESSION", conflicts_with_all = ["scan", "bag", "scene", "mesh_unit", "wrench_topic", "pose_topic", "pose_frame", "markers_topic"])]
     resume: Option<PathBuf>,
-    /// Refines also where something of the recording is surely wrong (`touchup doctor`)
+    /// Refines even if part of the recording is surely wrong (`touchup doctor`)
     #[arg(long)]
     force: bool,
-    /// Strokes that were taken back, done again, taken out or put back in the session
+    /// Undone, redone, removed and restored strokes of the session.
     #[arg(skip)]
     strokes: StrokeChanges,
     /// Also prints timings, rejected samples and the stages built from the scene
@@ -94,7 +90,7 @@ pub(super) struct RefineArguments {
     json: bool,
 }
 
-/// Takes a path that may be left out; empty: left out.
+/// Parser of an optional path; empty: missing.
 fn path_or_none() -> impl TypedValueParser<Value = PathBuf> {
     OsStringValueParser::new().map(PathBuf::from)
 }
@@ -104,7 +100,7 @@ const NO_SCAN: &str =
 
 const NO_PATCH: &str = "--live lets the patch follow, and the scene has none: take `patch: off` or `mode: paper` out of it";
 
-/// The command: refines, and prints the result.
+/// Runs `touchup refine`: refines, and prints the result.
 pub(super) fn refine(arguments: &RefineArguments) -> Result<Losses, CliError> {
     let arguments = arguments.clone().completed()?;
     #[cfg(any(feature = "ros", feature = "r2r"))]
@@ -126,7 +122,7 @@ pub(super) fn refine(arguments: &RefineArguments) -> Result<Losses, CliError> {
 }
 
 impl RefineArguments {
-    /// With what the session to be resumed, or the scene, names in place of flags.
+    /// Fills in values of the resumed session, or of the scene, for missing flags.
     fn completed(mut self) -> Result<Self, CliError> {
         if let Some(session) = self.resume.take() {
             let SessionRecord {
@@ -158,8 +154,7 @@ impl RefineArguments {
         Ok(self)
     }
 
-    /// What is left to be refined when the page was closed: the session that was made on it,
-    /// without what was undone there.
+    /// Remaining refinement after the page closes: its session, without strokes undone there.
     #[cfg(any(feature = "ros", feature = "r2r"))]
     #[expect(clippy::too_many_lines)]
     fn after_the_page(self) -> Result<Self, CliError> {
@@ -188,7 +183,7 @@ impl RefineArguments {
             .unwrap_or(std::path::Path::new(""))
             .join("sessions");
         let mut parameters = parameters_of(&self.scan, self.mesh_unit, &folder)?;
-        // files that the scene names are relative to its folder
+        // file names in the scene are relative to its folder
         let beside = self
             .scene
             .as_deref()
@@ -257,7 +252,7 @@ impl RefineArguments {
         files.refine(scene, told, options)
     }
 
-    /// Checks that the result can be written before the work begins.
+    /// Checks the outputs before the work begins.
     fn check_out(&self) -> Result<(), CliError> {
         let out = self.out.display();
         check_target(&self.out).map_err(|error| match error {
@@ -301,7 +296,7 @@ impl RefineArguments {
         Ok(())
     }
 
-    /// The scene with the flags over it, and by what its numbers are told.
+    /// Scene with the flags over it, and the sources of its numbers.
     fn scene(&self) -> Result<(Scene, ToldNumbers), CliError> {
         let (mut scene, told) = self.told.scene(self.scene.as_deref())?;
         if let Some(mode) = self.mode {

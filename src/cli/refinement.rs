@@ -1,4 +1,4 @@
-//! A refinement from files to files, for every verb that refines.
+//! Refinement from files to files, for all refining verbs.
 
 use std::fmt;
 use std::path::Path;
@@ -25,7 +25,7 @@ use crate::session::OutcomePlaces;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RefinementFiles<'a> {
     pub scan: &'a Path,
-    /// of the scan and of the refined mesh
+    /// Unit of the scan and of the refined mesh.
     pub mesh_unit: MeshUnit,
     pub recording: &'a Path,
     pub recorded: &'a RecordedAs,
@@ -37,11 +37,11 @@ pub(super) struct RefinementFiles<'a> {
 /// Output of `--json`; times in s.
 #[derive(Debug, Serialize)]
 pub(super) struct RefineSummary {
-    /// stages built from the scene, those left out with the reason of each, and the memory at start
+    /// Stages built from the scene, omitted ones with reasons, and the memory at start.
     scene: SceneCost,
-    /// numbers of tip and scan, and their sources
+    /// Numbers of tip and scan, and their sources.
     told: ToldNumbers,
-    /// origin of the scan in a point cloud; absent for a mesh
+    /// Origin of the scan in a point cloud; absent for a mesh.
     #[serde(skip_serializing_if = "Option::is_none")]
     cloud: Option<CloudSummary>,
     #[serde(flatten)]
@@ -52,7 +52,7 @@ pub(super) struct RefineSummary {
 
 /// Result of refining a scan.
 pub(super) struct Refined {
-    /// repairs of the scan's file
+    /// Repairs of the scan's file.
     pub repair: RepairReport,
     pub summary: RefineSummary,
     pub losses: Losses,
@@ -127,7 +127,7 @@ impl RefinementFiles<'_> {
         })
     }
 
-    /// The stages built from the scene for these samples.
+    /// Stages built from the scene for these samples.
     fn cost(&self, refinement: &Refinement) -> SceneCost {
         let unused = [
             LeftOut {
@@ -195,7 +195,7 @@ impl RefineSummary {
     }
 }
 
-/// The verdict, then further results.
+/// Verdict, then further results.
 impl fmt::Display for RefineSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}\n{}", self.refinement.verdict(), self.told)?;

@@ -23,31 +23,30 @@ use crate::scene::Scene;
 use crate::stylus::MarkerFilter;
 use crate::stylus::{Message, SyncParams};
 
-/// Wait after discovery of the subscribers: whether they have discovered us in turn they do not
-/// announce.
+/// Wait after discovery of the subscribers, which do not announce their own discovery of this node.
 const DISCOVERY: Duration = Duration::from_secs(1);
-/// Period of the look for subscribers.
+/// Polling period for subscribers.
 const LOOK: Duration = Duration::from_millis(50);
-/// A longer wait is reported, with its reason.
+/// Delay before a report of the wait, with its reason.
 const REPORT_AFTER: Duration = Duration::from_secs(2);
 /// Longest transport time of the last message.
 const LINGER: Duration = Duration::from_millis(300);
 
 #[derive(Debug, Args)]
 pub(super) struct ReplayArguments {
-    /// A ROS 2 recording, MCAP or SQLite, a file or a folder; a bag of ROS 1; or a table (CSV, log
-    /// of a UR's RTDE)
+    /// Recording: MCAP or SQLite of ROS 2 (file or folder), bag of ROS 1, or table (CSV, log of a
+    /// UR's RTDE)
     #[arg(value_name = "RECORDING")]
     recording: PathBuf,
     /// Speed, in multiples of the recorded one
     #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = speed)]
     speed: f64,
-    /// What touched: selects the topics to play on
+    /// Touching tool: selects the topics to play on
     #[arg(long, value_name = "WHO", default_value = "stylus", value_parser = ["stylus", "probe"])]
     source: String,
     #[command(flatten)]
     recorded: RecordedFlags,
-    /// The scene that says where the markers sit
+    /// Scene with the positions of the markers
     #[arg(long, value_name = "YAML")]
     scene: Option<PathBuf>,
     /// Prints the counts of played messages as one JSON object
@@ -63,17 +62,17 @@ fn speed(text: &str) -> Result<f64, String> {
         .ok_or_else(|| "it must be 0.01 to 100".to_owned())
 }
 
-/// What `--json` prints.
+/// Output of `--json`.
 #[derive(Debug, Default, Serialize)]
 pub(super) struct Played {
     wrenches: u64,
     poses: u64,
-    /// that the network did not take
+    /// Messages refused by the network.
     unsent: u64,
     played_s: f64,
 }
 
-/// - `ros`: the arguments behind `--ros-args`.
+/// - `ros`: arguments behind `--ros-args`.
 pub(super) fn replay(arguments: &ReplayArguments, ros: &[String]) -> Result<Losses, CliError> {
     let mut config = NodeConfig::named("touchup_replay", ros, |name| std::env::var(name).ok())?;
     let source = ParameterValue::String(arguments.source.clone());
@@ -122,10 +121,9 @@ pub(super) fn replay(arguments: &ReplayArguments, ros: &[String]) -> Result<Loss
     Ok(losses)
 }
 
-/// Plays a recording in real time, each stream in the order of its stamps; what was played, and
-/// what of the recording was lost.
+/// Plays a recording in real time, each stream in stamp order; returns counts and losses.
 ///
-/// - `source`: who touches, `stylus` or `probe`: its sensor gives the wrenches their frame.
+/// - `source`: touching tool, `stylus` or `probe`: its sensor is the frame of the wrenches.
 pub(super) fn play(
     recording: Recording,
     markers: Option<MarkerFilter>,
@@ -159,7 +157,7 @@ pub(super) fn play(
     Ok((played, replayed))
 }
 
-/// Waits for subscribers: the beginning of a recording must not be lost either.
+/// Waits for subscribers, so that the beginning of a recording reaches them.
 fn wait_for_listeners(port: &mut dyn SamplePort, config: &NodeConfig, recording: &Path) {
     let began = Instant::now();
     let mut is_reported = false;
@@ -179,24 +177,24 @@ fn wait_for_listeners(port: &mut dyn SamplePort, config: &NodeConfig, recording:
     sleep(DISCOVERY);
 }
 
-/// Puts each stream in the order of its stamps, in which a sensor sends and the node takes it: what
-/// came into the recording later than what was measured after it.
+/// Sorts each stream by stamp, the sending order of a sensor and the node's input order, against
+/// late arrivals in the recording.
 #[derive(Default)]
 struct StampOrder {
-    /// poses and wrenches
+    /// Poses and wrenches.
     streams: [ReplayStream; 2],
     count: u64,
 }
 
 #[derive(Default)]
 struct ReplayStream {
-    /// by stamp, those of one stamp as they came
+    /// Messages by stamp; equal stamps in order of arrival.
     held: BTreeMap<(i64, u64), Message>,
     newest_ns: Option<i64>,
 }
 
 impl StampOrder {
-    /// Passes on what cannot be overtaken any more: `touchup refine` waits as long.
+    /// Passes on messages that none can overtake any more, after the same wait as `touchup refine`.
     fn push(&mut self, message: Message, mut each: impl FnMut(Message)) {
         let stamp_ns = message.stamp_ns();
         let stream = &mut self.streams[usize::from(matches!(message, Message::Wrench(_)))];
@@ -221,7 +219,7 @@ impl StampOrder {
     }
 }
 
-/// When what was measured at a stamp is due.
+/// Schedule of the messages by their stamps.
 struct ReplayPace {
     speed: f64,
     time: PlayedTime,
@@ -237,7 +235,7 @@ impl ReplayPace {
         }
     }
 
-    /// Time since the beginning at which it is due. A stamp that goes back is due at once.
+    /// Due time of a stamp since the beginning; a stamp that goes back is due at once.
     fn due(&mut self, stamp_ns: i64) -> Duration {
         Duration::from_secs_f64(self.time.at_ns(stamp_ns) as f64 * 1e-9 / self.speed)
     }
@@ -296,7 +294,7 @@ mod tests {
                 .filter(move |(_, is_wrench)| *is_wrench == wanted)
                 .map(|(stamp_ms, _)| *stamp_ms)
         };
-        // 3 is more than 20 ms behind: it comes where it came
+        // 3 is more than 20 ms behind and keeps its place
         assert_eq!(of(true).collect::<Vec<_>>(), [0, 9, 9, 3, 12, 30]);
         assert_eq!(of(false).collect::<Vec<_>>(), [2, 5, 40]);
     }

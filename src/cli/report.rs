@@ -1,4 +1,4 @@
-//! `touchup report`: runs the program `touchup-report`, so that nothing of it is in this one.
+//! `touchup report`: runs the program `touchup-report`, to keep its code out of this one.
 
 use std::ffi::OsString;
 use std::io::ErrorKind;
@@ -11,17 +11,17 @@ use super::error::{CliError, Losses};
 const MISSING: &str = "touchup-report is neither beside this program nor on the path: `cargo install --locked --path crates/touchup-report` in \
      touchup's folder puts it there, `cargo run --release -p touchup-report -- --out out` does without";
 
-/// The program, beside this one or on the path.
+/// Program, beside this one or on the path.
 const PROGRAM: &str = "touchup-report";
 
 #[derive(Debug, Args)]
 pub(super) struct HandedOver {
-    /// Those of `touchup-report`; --help lists them
+    /// Arguments of `touchup-report`; --help lists them
     #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
     arguments: Vec<OsString>,
 }
 
-/// The verb: ends with the exit code of that program.
+/// Runs `touchup-report`, and ends with its exit code.
 pub(super) fn report(arguments: &HandedOver) -> Result<Losses, CliError> {
     let beside = std::env::current_exe()
         .ok()
@@ -44,7 +44,7 @@ pub(super) fn report(arguments: &HandedOver) -> Result<Losses, CliError> {
                 None,
             )
         })?;
-    // what went wrong it has said itself
+    // the program has printed its own errors
     if status.success() {
         Ok(Losses::new())
     } else {

@@ -1,4 +1,4 @@
-//! `touchup node --web` without a scan: the setup on the page, until a node is ready to start.
+//! `touchup node --web` without a scan: setup on the page, until a node is ready to start.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -16,10 +16,10 @@ use crate::scan::ScanError;
 
 /// Serves the setup.
 ///
-/// - `scans`: folder in which scans lie.
+/// - `scans`: folder of the scans.
 ///
 /// # Errors
-/// The folder or the scene cannot be used.
+/// An unusable folder or scene.
 pub(super) fn set_up(
     server: &WebServer,
     scans: &Path,
@@ -44,12 +44,11 @@ pub(super) fn set_up(
     })?)
 }
 
-/// Waits until a node has begun that was set up on the page: what `begin` makes of it, and in
-/// `config` what that was made of. Whatever is wrong with what is chosen, with the network or with
-/// the arm is shown on the page.
+/// Waits for a node set up on the page to begin; returns the result of `begin`, with its
+/// configuration in `config`. The page shows faults of the selection, the network and the arm.
 ///
 /// # Errors
-/// A path that is no parameter.
+/// A path that cannot be a parameter.
 pub(super) fn set_up_on_page<B>(
     setup: &NodeSetup,
     config: &mut NodeConfig,
@@ -58,7 +57,7 @@ pub(super) fn set_up_on_page<B>(
     notify("no scan is named: choose one on the page; Ctrl-C ends the program");
     loop {
         let scene = setup.wait();
-        // what was said on the page is in the scene, also the radius
+        // the scene has all settings of the page, even the radius
         for (name, value) in [
             ("scene", path(&scene)?),
             ("tip_radius_mm", ParameterValue::Double(0.0)),
@@ -80,7 +79,7 @@ pub(super) fn set_up_on_page<B>(
     }
 }
 
-/// Where on the page an error can be mended.
+/// Step on the page at which the user can mend an error.
 fn step_of(error: &BeginError) -> SetupStep {
     let BeginError::Node(error) = error else {
         return SetupStep::Start;

@@ -1,4 +1,4 @@
-//! The signals that end a verb: SIGINT (Ctrl-C), SIGTERM, and of the node SIGHUP.
+//! Signals that end a verb: SIGINT (Ctrl-C), SIGTERM, and for the node SIGHUP.
 
 use std::future::poll_fn;
 use std::io;
@@ -22,7 +22,7 @@ use crate::ros::inbox::Inbox;
 #[cfg(any(feature = "ros", feature = "r2r"))]
 use crate::ros::port::Arrival;
 
-/// Calls `each` on a thread of its own with the number of signals until then, from 1 on.
+/// Calls `each` on its own thread with the count of signals, from 1 on.
 pub(super) fn on_each_signal(
     kinds: &[SignalKind],
     mut each: impl FnMut(u32) + Send + 'static,
@@ -47,16 +47,16 @@ pub(super) fn on_each_signal(
         .map(drop)
 }
 
-/// The node that signals end; while there is none, a signal ends the program at once.
+/// Target node of the signals; without one, a signal ends the program at once.
 #[cfg(any(feature = "ros", feature = "r2r"))]
 #[derive(Debug)]
 pub(super) struct SignalledNode(Arc<Mutex<Option<Inbox>>>);
 
 #[cfg(any(feature = "ros", feature = "r2r"))]
 impl SignalledNode {
-    /// Listens from now on. The first signal ends the node, which saves, and its arm stops and
-    /// retracts. The next one has an arm that still retracts stop and stay; one more, or the second
-    /// where no arm moves, waits for nothing.
+    /// Starts listening. The first signal ends the node, which saves, and its arm stops and
+    /// retracts. The next one stops a still retracting arm in place; one more, or the second
+    /// without arm motion, ends the program at once.
     pub fn listen() -> io::Result<Self> {
         let node = Arc::new(Mutex::new(None::<Inbox>));
         let heard = Arc::clone(&node);
@@ -74,7 +74,7 @@ impl SignalledNode {
                 notify(
                     "ends and saves; a second signal ends it at once, or stops an arm that still retracts where it is",
                 );
-                // a node that has ended already needs none
+                // an ended node needs no shutdown
                 inbox.put(Arrival::Shutdown);
                 return;
             }
@@ -86,13 +86,13 @@ impl SignalledNode {
         Ok(Self(node))
     }
 
-    /// From now on it is this one.
+    /// Sets the node to end.
     pub fn set(&self, node: Option<Inbox>) {
         *self.0.lock().unwrap_or_else(PoisonError::into_inner) = node;
     }
 }
 
-/// Waits for any of them.
+/// Waits for any signal.
 async fn any(signals: &mut [Signal]) {
     poll_fn(|context| {
         match signals
@@ -106,7 +106,7 @@ async fn any(signals: &mut [Signal]) {
     .await;
 }
 
-/// How the user has asked an arm to stop.
+/// Stop requests of the user to an arm.
 #[derive(Clone, Debug, Default)]
 pub(super) struct StopSignals {
     count: Arc<AtomicU32>,
@@ -114,11 +114,11 @@ pub(super) struct StopSignals {
 }
 
 impl StopSignals {
-    /// Listens from now on: the first signal has the arm stop and retract, the second has it stay
-    /// where it is.
+    /// Starts listening: at the first signal the arm stops and retracts, at the second it stays in
+    /// place.
     ///
     /// # Errors
-    /// Where the system has no thread for that: kind `signals`.
+    /// If the system has no thread for it: kind `signals`.
     pub fn listen() -> Result<Self, CliError> {
         let signals = Self::default();
         let Self { count, is_at_rest } = signals.clone();
@@ -144,12 +144,12 @@ impl StopSignals {
         Ok(signals)
     }
 
-    /// What the signals until now ask for.
+    /// Stop request from the signals until now.
     pub fn request(&self) -> Option<StopRequest> {
         request_of(self.count.load(Ordering::Acquire))
     }
 
-    /// Nothing moves any more: the next signal ends the program at once.
+    /// Marks the end of motion: the next signal ends the program at once.
     pub fn arm_is_at_rest(&self) {
         self.is_at_rest.store(true, Ordering::Release);
     }

@@ -1,5 +1,5 @@
-//! `touchup simulate`: scan and touches of a known surface by a bad scanner and a stylus, as the
-//! files that `refine` reads.
+//! `touchup simulate`: scan and touches of a known surface by a bad scanner and a stylus, as input
+//! files of `refine`.
 
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
@@ -25,13 +25,13 @@ use crate::stylus::{MarkerFrame, Message};
 
 /// File of the true part, in the output folder.
 const TRUTH_NAME: &str = "truth.ply";
-/// File of the true contacts, in the output folder: of every so many ticks of 1 ms.
+/// File of the true contacts, in the output folder: one in `CONTACT_EVERY` ticks of 1 ms.
 const CONTACTS_NAME: &str = "truth_contacts.csv";
 const CONTACT_EVERY: usize = 10;
 const CONTACTS_HEAD: &str =
     "t_s,centre_x_mm,centre_y_mm,centre_z_mm,contact_x_mm,contact_y_mm,contact_z_mm\n";
-/// The hand moves 0.08 mm in each tick of the simulation: a smaller ball would go through the part
-/// and take for ever.
+/// Tip radii, mm. The hand moves 0.08 mm in each tick of the simulation: a smaller ball would go
+/// through the part, at endless run time.
 const TIP_RADII_MM: RangeInclusive<f64> = 0.1..=100.0;
 /// Frame of the poses in the recordings.
 const OBJECT_FRAME: &str = "object";
@@ -42,7 +42,7 @@ const MARKERS_TOPIC: &str = "/stylus/markers";
 
 #[derive(Debug, Args)]
 pub(super) struct SimulateArguments {
-    /// The true part: a closed mesh, PLY, STL or OBJ
+    /// True part: a closed mesh, PLY, STL or OBJ
     #[arg(long, value_name = "MESH")]
     truth: PathBuf,
     /// Unit of the coordinates in the part's file
@@ -59,20 +59,19 @@ pub(super) struct SimulateArguments {
     markers: bool,
 }
 
-/// What is drawn or named of a simulated scan and touch.
+/// Settings of a simulated scan and touch.
 #[derive(Clone, Debug, Args)]
 pub struct SimulationSettings {
-    /// Another seed makes another scan and another path
+    /// Seed of the scan and the path
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
-    /// Draws the truth of all that is not named from the ranges of a world, and writes what a
-    /// calibration tells of it as scene.yaml (for refine --scene) and each true value as
-    /// truth.json: workshop_stylus, optical_tracker, ur, soft_probe, careless_operator
+    /// Draws true values without a flag from the ranges of a world, and writes a calibration of it
+    /// as scene.yaml (for refine --scene) and each true value as truth.json: workshop_stylus,
+    /// optical_tracker, ur, soft_probe, careless_operator
     #[arg(long, value_name = "NAME", value_parser = world_named, conflicts_with = "markers")]
     pub world: Option<SimWorld>,
-    /// By which factor the errors of what is told are larger than the scene says: 3 for all,
-    /// radius=3 for one (radius, stiffness, tip-offset, registration, clock, tare); may be given
-    /// again
+    /// Factor of the calibration errors relative to the scene's uncertainties: 3 for all, radius=3
+    /// for one (radius, stiffness, tip-offset, registration, clock, tare); repeat for each
     #[arg(long, value_name = "FACTOR", requires = "world")]
     pub told_off: Vec<OffFactor>,
     /// True radius of the ball, mm [default: 1.5, or as the world draws it]
@@ -91,10 +90,10 @@ pub struct SimulationSettings {
     /// Noise of the scan along its normals, mm [default: 0.6, or as the world draws it]
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub scan_noise_mm: Option<f64>,
-    /// How good the scanner is [default: cheap, or as the world draws it]
+    /// Quality of the scanner [default: cheap, or as the world draws it]
     #[arg(long, value_enum)]
     pub scanner: Option<ScannerKind>,
-    /// Sides of the part from which the hand reaches it, by the axis that points there: z,x,-y
+    /// Sides from which the hand reaches the part, by the axis that points there: z,x,-y
     #[arg(
         long,
         value_name = "AXES",
@@ -124,19 +123,19 @@ impl Default for SimulationSettings {
     }
 }
 
-/// How good a scanner is.
+/// Quality of a scanner.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum ScannerKind {
-    /// hand-held: noisy, rounded, holes closed over
+    /// Hand-held: noisy, rounded, holes closed over
     Cheap,
-    /// stationary: fine and exact, without the floors of deep holes
+    /// Stationary: fine and exact, without the floors of deep holes
     Good,
 }
 
-/// A side of the part.
+/// Side of the part.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Side {
-    /// towards the hand, in O
+    /// Direction towards the hand, in O.
     towards: Unit<Vector3<f64>>,
 }
 
@@ -159,8 +158,8 @@ impl FromStr for Side {
     }
 }
 
-/// The command: scans the part from above (along −z), touches it from there, and prints where the
-/// files are.
+/// Runs `touchup simulate`: scans the part from above (along −z), touches it from its sides, and
+/// prints the folder.
 pub(super) fn simulate(arguments: &SimulateArguments) -> Result<Losses, CliError> {
     arguments.settings.check()?;
     check_kept("--truth", &arguments.truth, &arguments.out.join(TRUTH_NAME))?;
@@ -215,7 +214,7 @@ pub(super) fn simulate(arguments: &SimulateArguments) -> Result<Losses, CliError
     Ok(Losses::new())
 }
 
-/// Scanner, stylus and hand as they truly are, and the world that they were drawn from.
+/// True scanner, stylus and hand, and their world.
 struct SimulationWorld {
     scanner: ScannerParams,
     stylus: StylusParams,
@@ -237,14 +236,14 @@ impl SimulationWorld {
     }
 }
 
-/// A scan and a touch of a part, without files.
+/// Scan and touch of a part, without files.
 #[derive(Debug)]
 pub struct Simulation {
-    /// what the scanner made of the part
+    /// Scan of the part.
     pub scan: TriMesh,
-    /// what the hand touched
+    /// Touch of the part.
     pub touch: Touch,
-    /// what a calibration tells of the world, as the text of a scene; none without a world
+    /// Calibration of the world, as the text of a scene; `None` without a world.
     pub scene: Option<String>,
 }
 
@@ -254,7 +253,7 @@ impl SimulationSettings {
     /// - `truth`: the part, closed, m.
     ///
     /// # Errors
-    /// [`CliError`] for settings out of their range and for a part that cannot be touched.
+    /// [`CliError`] for settings out of their range and for an untouchable part.
     pub fn simulated(&self, truth: &TriMesh) -> Result<Simulation, CliError> {
         self.check()?;
         let surface = MeshSurface::new(truth)?;
@@ -277,7 +276,7 @@ impl SimulationSettings {
         require(TIP_RADII_MM.contains(&given), why)
     }
 
-    /// As it is drawn, with what is named put in place of it.
+    /// World as drawn, with the named values in place.
     fn world(&self) -> Result<SimulationWorld, CliError> {
         let off = OffFactor::joined(&self.told_off)?;
         let mut drawn = self
@@ -326,14 +325,14 @@ impl SimulationSettings {
     }
 }
 
-/// A simulated scan and touch.
+/// Simulated scan and touch.
 pub(super) struct Simulated {
     pub scan: TriMesh,
     pub touch: Touch,
 }
 
 /// Scans and touches `surface`, and writes truth.ply, scan.ply (both in mm) and touch.mcap into
-/// `folder`; with a camera the recording also has what that saw of the markers on the stylus. All
+/// `folder`; with a camera the recording also has its view of the markers on the stylus. All
 /// randomness comes from the seed of `scanner`.
 pub(super) fn write_simulation(
     surface: &dyn Surface,
@@ -372,7 +371,7 @@ pub(super) fn write_simulation(
     Ok(Simulated { scan, touch })
 }
 
-/// Writes where the ball really was and really touched: a line for each contact, mm, in O.
+/// Writes the true ball centres and contact points: a line for each contact, mm, in O.
 fn write_contacts(moments: &[Moment], path: &Path) -> Result<(), CliError> {
     let touched = moments
         .iter()
@@ -395,7 +394,7 @@ fn write_contacts(moments: &[Moment], path: &Path) -> Result<(), CliError> {
         .map_err(not_written(path))
 }
 
-/// Each frame of markers in front of the first message that is later.
+/// Messages, with each frame of markers before the first later message.
 fn merged(messages: &[Message], frames: Vec<MarkerFrame>) -> impl Iterator<Item = Record> {
     let mut frames = frames.into_iter().peekable();
     let last_ns = messages.iter().map(Message::stamp_ns).max();

@@ -1,4 +1,4 @@
-//! `touchup simulate --world`: what is told of a drawn world as a scene, and the truth beside it.
+//! `touchup simulate --world`: calibration of a drawn world as a scene, and its truth.
 
 use std::path::Path;
 use std::str::FromStr;
@@ -10,7 +10,7 @@ use super::output::write_json;
 use crate::io::atomic::write_atomically;
 use crate::sim::{DrawnValue, DrawnWorld, SimWorld, ToldOff};
 
-/// A factor for all that is told, or for one of it.
+/// Error factor for all calibrated values, or for one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OffFactor {
     quantity: Option<String>,
@@ -37,7 +37,7 @@ impl FromStr for OffFactor {
 }
 
 impl OffFactor {
-    /// Sets what it says.
+    /// Applies this factor.
     fn set(&self, off: &mut ToldOff) -> Result<(), String> {
         let place = match self.quantity.as_deref() {
             None => {
@@ -59,7 +59,7 @@ impl OffFactor {
         Ok(())
     }
 
-    /// The factors of all, one after another.
+    /// Combines factors; later ones override.
     pub fn joined(given: &[Self]) -> Result<ToldOff, CliError> {
         let mut off = ToldOff::all(1.0);
         for factor in given {
@@ -75,7 +75,7 @@ pub(super) fn world_named(name: &str) -> Result<SimWorld, String> {
     SimWorld::named(name).ok_or_else(|| format!("there is no world {name}: take one of {names}"))
 }
 
-/// Writes the scene of what is told: for `refine --scene`.
+/// Writes the calibrated scene: for `refine --scene`.
 ///
 /// - `lever`: root mean square distance of the part from its origin, m.
 pub(super) fn write_told_scene(
@@ -88,7 +88,7 @@ pub(super) fn write_told_scene(
         .map_err(super::not_written(path))
 }
 
-/// Writes each drawn value with its unit, and what was told of it; all in SI.
+/// Writes each drawn value with its unit and its calibrated value; all in SI.
 pub(super) fn write_truth(drawn: &DrawnWorld, path: &Path) -> Result<(), CliError> {
     let (told, sensor) = (&drawn.told, &drawn.stylus.sensor);
     let value = |v: &DrawnValue| {

@@ -1,12 +1,12 @@
-//! `touchup step`: the paper's equations for one held sample per JSON line, so that any other
-//! implementation can be compared.
+//! `touchup step`: the paper's equations for one held sample per JSON line, for comparison with any
+//! other implementation.
 //!
 //! In:
 //! `{"p_m","force_n","b_m","n","dt_s","h_min_m","delta","f_max_n","alpha_m_per_n_s","beta_per_n2_s",
 //! "step":"lie|corrected|bounded|dp5","along":"normal0|force"}`, vectors as arrays of three, all in
 //! one frame; `k_n_per_m` instead of the three sigmoid values selects the linear spring. Out, in
 //! the same order: `{"b_m","n"}` with 17 digits, or `{"error"}`; a bad line does not end the run.
-//! No rigid-contact offset is taken out.
+//! The dynamics keep the rigid-contact offset.
 
 use std::io::{self, BufRead, Write};
 
@@ -17,7 +17,7 @@ use crate::haptic::{
     Along, ContactModel, DynamicsError, DynamicsParams, FaceDynamics, FaceState, StepRule,
 };
 
-/// A longer line is not a sample.
+/// Longest line of a sample, bytes.
 const LONGEST_LINE: u64 = 64 * 1024;
 
 #[derive(Deserialize)]
@@ -54,11 +54,10 @@ enum StepError {
     Dynamics(#[from] DynamicsError),
 }
 
-/// Answers every line of `input` with one line on `output`, flushed at once; blank lines are
-/// skipped.
+/// Answers every line of `input` with one line on `output`, flushed at once; skips blank lines.
 ///
 /// # Errors
-/// Only of reading and writing; a line that cannot be answered gets `{"error": …}`.
+/// Failures of reading or writing; an unanswerable line gets `{"error": …}`.
 pub fn run(mut input: impl BufRead, mut output: impl Write) -> io::Result<()> {
     let mut line = Vec::new();
     loop {
@@ -159,7 +158,7 @@ mod tests {
 
     #[test]
     fn every_line_gets_one_reply() {
-        // after e^−1000 of the distance is left, b lies at the tip; an unended last line counts
+        // e^−1000 of the distance remains: b lies at the tip; an unended last line counts
         let good = SPRING.replace('\n', "");
         let replies = replies(&format!(
             "{good}\n\n{{}}\n{}\n{good}",

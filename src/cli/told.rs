@@ -1,4 +1,4 @@
-//! The numbers of tip and scan that a result depends on, and who told them.
+//! Settings of tip and scan that determine a result, and their sources.
 
 use std::fmt;
 use std::path::Path;
@@ -11,10 +11,10 @@ use crate::scene::Scene;
 #[cfg(any(feature = "ros", feature = "r2r"))]
 use crate::scene::Setting;
 
-/// The flags that tell of tip and scan, over the scene.
+/// Flags for tip and scan, over the scene.
 #[derive(Clone, Debug, Default, Args)]
 pub(super) struct ToldFlags {
-    /// Radius of the ball, mm; needed where no scene names it
+    /// Radius of the ball, mm; required if no scene has it
     #[arg(long, value_name = "R", allow_negative_numbers = true)]
     tip_radius_mm: Option<f64>,
     /// Stiffness of stylus and holder at the ball, N/mm
@@ -26,7 +26,7 @@ pub(super) struct ToldFlags {
 }
 
 impl ToldFlags {
-    /// Only the radius of the ball, m.
+    /// Flags with only the radius of the ball, m.
     pub fn of_radius(radius: f64) -> Self {
         Self {
             tip_radius_mm: Some(radius * 1e3),
@@ -34,11 +34,10 @@ impl ToldFlags {
         }
     }
 
-    /// The scene of a file, or the usual one, with the flags over it, and by what its numbers are
-    /// told.
+    /// Scene of a file, or the default one, with the flags over it, and the sources of its numbers.
     ///
     /// # Errors
-    /// Where nobody told the radius, and for a scene or a flag out of its range.
+    /// A missing tip radius, and a scene or a flag out of its range.
     pub fn scene(&self, path: Option<&Path>) -> Result<(Scene, ToldNumbers), CliError> {
         let (mut scene, yaml) = match path {
             Some(path) => Scene::read_with_text(path)?,
@@ -60,7 +59,7 @@ impl ToldFlags {
 }
 
 impl ToldFlags {
-    /// Sets what the flags tell.
+    /// Applies the flags.
     fn tell(&self, scene: &mut Scene, yaml: &str) -> Result<(), CliError> {
         scene.tell_radius(yaml, self.tip_radius_mm)?;
         if let Some(stiffness) = self.stiffness_n_per_mm {
@@ -69,14 +68,14 @@ impl ToldFlags {
         if let Some(noise_mm) = self.scan_noise_mm {
             scene.scan.get_or_insert_default().quality.noise = noise_mm / 1e3;
         }
-        // the file was in range when it was read: what is not now came by a flag
+        // the file was in range when read: a flag set any value out of range
         scene.validate().map_err(CliError::usage)
     }
 
-    /// The text of a scene, or of the usual one, with what the flags tell.
+    /// Text of a scene, or of the default one, with the values of the flags.
     ///
     /// # Errors
-    /// As [`Self::scene`], and for a scene whose text is of a form in which nothing can be set.
+    /// As [`Self::scene`], and for a scene whose text form allows no edits.
     #[cfg(any(feature = "ros", feature = "r2r"))]
     pub fn scene_text(&self, path: Option<&Path>) -> Result<String, CliError> {
         let yaml = match path {
@@ -103,7 +102,7 @@ impl ToldFlags {
     }
 }
 
-/// A number that the result depends on.
+/// Number that determines the result.
 #[derive(Clone, Debug, Serialize)]
 struct ToldNumber {
     value: f64,
@@ -111,22 +110,22 @@ struct ToldNumber {
 }
 
 touchup_core::names! {
-    /// Where a number comes from.
+    /// Source of a number.
     #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
     #[serde(rename_all = "snake_case")]
     pub enum ToldBy {
-        /// a flag
+        /// A flag.
         Flag = "flag",
-        /// a parameter of the node
+        /// A parameter of the node.
         Parameter = "parameter",
-        /// the scene
+        /// The scene.
         Scene = "scene",
-        /// nobody: that of a usual cell
+        /// Default of a usual cell.
         Default = "default",
     }
 }
 
-/// What was told of tip and scan; of a rigid tip no stiffness.
+/// Settings of tip and scan; a rigid tip has no stiffness.
 #[derive(Clone, Debug, Serialize)]
 pub(super) struct ToldNumbers {
     tip_radius_mm: ToldNumber,
@@ -136,7 +135,7 @@ pub(super) struct ToldNumbers {
 
 impl ToldNumbers {
     /// - `yaml`: text of the scene; empty for none.
-    /// - `others`: who told radius, stiffness and noise over the scene.
+    /// - `others`: sources of radius, stiffness and noise over the scene.
     pub fn of(scene: &Scene, yaml: &str, others: [Option<ToldBy>; 3]) -> Self {
         let [by_radius, by_stiffness, by_noise] = others;
         let told = |value: f64, other: Option<ToldBy>, section: &str, key: &str| {

@@ -9,12 +9,12 @@ use crate::ur::{child, setup};
 
 #[derive(Debug, Subcommand)]
 pub(super) enum UrArguments {
-    /// Makes a virtual environment with ur-rtde and prints the folder that the parameter
-    /// site_packages has to name
+    /// Makes a virtual environment with ur-rtde and prints the folder for the parameter
+    /// site_packages
     Setup {
         /// Folder of the environment
         folder: PathBuf,
-        /// Interpreter to make it with [default: that of the version touchup was built with]
+        /// Interpreter for the environment [default: that of the version touchup was built with]
         #[arg(long)]
         python: Option<String>,
     },

@@ -1,4 +1,4 @@
-//! `--web`: where the operator's page is served, of every verb that has one.
+//! `--web`: address of the operator page, for all verbs with one.
 
 use std::net::{SocketAddr, ToSocketAddrs};
 use std::path::{Path, PathBuf};
@@ -26,7 +26,7 @@ use crate::ros::web::{Certificate, Invitation, NodeFacts, WebParams, WebServer};
 use crate::scan::read_scan;
 use crate::scene::Scene;
 
-/// There is none.
+/// Server of a build without the page: none.
 #[cfg(not(feature = "web"))]
 pub(super) enum WebServer {}
 
@@ -40,27 +40,25 @@ impl WebServer {
 #[cfg(not(feature = "web"))]
 const NOT_BUILT: &str = "this touchup was built without the page: cargo install --locked --path . --features web (needs npm)";
 
-/// Where the page is served.
+/// Address and access of the page.
 #[derive(Clone, Debug, Default, Args)]
 pub(super) struct WebFlags {
-    /// Serves the operator's page at this address; another one than that of this machine alone lets
-    /// in who has a link
+    /// Serves the operator page at ADDRESS; on a non-loopback address access needs a link
     #[arg(long, value_name = "ADDRESS", num_args = 0..=1, default_missing_value = "127.0.0.1:8321", value_parser = address)]
     web: Option<SocketAddr>,
-    /// Name of this machine by which the page may be called, beside its address; can be given again
+    /// Name of this machine for the page, beside its address; repeat for each
     #[arg(long, value_name = "NAME", requires = "web")]
     web_name: Vec<String>,
-    /// Lets in by link alone also on this machine, where else every user is
+    /// Requires a link on this machine too, instead of access for every user
     #[arg(long, requires = "web")]
     web_links: bool,
-    /// The part as it should be, in the frame and the unit of the scan: the page colours by the
-    /// deviation from it
+    /// Nominal part, in the frame and unit of the scan: the page colours by the deviation from it
     #[arg(long, value_name = "MESH", requires = "web")]
     web_nominal: Option<PathBuf>,
     /// Serves the page by TLS with this certificate chain, PEM
     #[arg(long, value_name = "PEM", requires_all = ["web", "web_key"])]
     web_certificate: Option<PathBuf>,
-    /// The key of the certificate, PEM
+    /// Key of the certificate, PEM
     #[arg(long, value_name = "PEM", requires = "web_certificate")]
     web_key: Option<PathBuf>,
 }
@@ -74,12 +72,12 @@ fn address(text: &str) -> Result<SocketAddr, String> {
 }
 
 impl WebFlags {
-    /// Whether a page is wanted.
+    /// Whether `--web` requests a page.
     pub fn is_wanted(&self) -> bool {
         self.web.is_some()
     }
 
-    /// The same with a nominal part, unless one was named.
+    /// The same flags with a nominal part, unless they name one.
     pub fn with_nominal(&self, mesh: PathBuf) -> Self {
         Self {
             web_nominal: self.web_nominal.clone().or(Some(mesh)),
@@ -87,10 +85,10 @@ impl WebFlags {
         }
     }
 
-    /// Whether the setup on the page is needed: a page is wanted, and nobody named a scan.
+    /// Whether the page must do the setup: `--web` without a scan.
     ///
     /// # Errors
-    /// The scene cannot be used.
+    /// An unusable scene.
     fn needs_setup(&self, parameters: &Parameters) -> Result<bool, CliError> {
         if !self.is_wanted() || !parameters.string("scan").is_empty() {
             return Ok(false);
@@ -99,7 +97,7 @@ impl WebFlags {
         Ok(scene.as_os_str().is_empty() || Scene::read(scene)?.scan_file(scene).is_none())
     }
 
-    /// What `begin` makes of a configuration.
+    /// Result of `begin` for a configuration.
     #[cfg(not(feature = "web"))]
     pub fn begun<B>(
         &self,
@@ -111,10 +109,10 @@ impl WebFlags {
         Ok((begin(config)?, None))
     }
 
-    /// What `begin` makes of a configuration, or where that names no scan, of what is set up on the
-    /// page, which then is served already.
+    /// Result of `begin` for a configuration, or, if that names no scan, for the setup on the page,
+    /// with its server.
     ///
-    /// - `scans`: where scans lie.
+    /// - `scans`: folder of the scans.
     #[cfg(feature = "web")]
     pub fn begun<B>(
         &self,
@@ -137,15 +135,15 @@ impl WebFlags {
         Ok((set_up_on_page(&setup, config, begin)?, Some(server)))
     }
 
-    /// The nominal part, where one is named.
+    /// Nominal part, if named.
     #[cfg(not(feature = "web"))]
     pub fn nominal(&self, _: MeshUnit) -> Result<Option<TriMesh>, CliError> {
         Ok(None)
     }
 
-    /// The nominal part, where one is named.
+    /// Nominal part, if named.
     ///
-    /// - `unit`: of its file.
+    /// - `unit`: unit of its file.
     #[cfg(feature = "web")]
     pub fn nominal(&self, unit: MeshUnit) -> Result<Option<TriMesh>, CliError> {
         let nominal = self
@@ -156,7 +154,7 @@ impl WebFlags {
         Ok(nominal.map_err(CliError::truth)?.map(|scan| scan.mesh))
     }
 
-    /// The port for the node: no page is wanted, or this program has none.
+    /// Port for the node, without a page.
     #[cfg(not(feature = "web"))]
     pub fn serve(
         &self,
@@ -170,9 +168,9 @@ impl WebFlags {
         Ok((network, None))
     }
 
-    /// Serves the page where it is wanted, and says where: the port for the node.
+    /// Serves a requested page and prints its address; returns the port for the node.
     ///
-    /// - `opened`: the server, where there is one already.
+    /// - `opened`: already running server.
     #[cfg(feature = "web")]
     pub fn serve(
         &self,
@@ -199,7 +197,7 @@ impl WebFlags {
         let facts = NodeFacts {
             scan,
             scan_mesh: ready.scan_mesh(),
-            // on the page, when it was set up
+            // the setup on the page has confirmed it
             is_size_confirmed: was_open,
             session_folder,
             nominal,
@@ -219,7 +217,7 @@ impl WebFlags {
         files.map(|(chain, key)| Certificate { chain, key })
     }
 
-    /// The server, where a page is wanted; it is not announced yet.
+    /// Unannounced server for a requested page.
     #[cfg(feature = "web")]
     fn listening(&self) -> Result<Option<WebServer>, CliError> {
         let Some(address) = self.web else {
@@ -235,7 +233,7 @@ impl WebFlags {
         Ok(Some(WebServer::open(&params, invite)?))
     }
 
-    /// Says where the page is, and by which links it lets in.
+    /// Prints addresses and invitation links of the page.
     #[cfg(feature = "web")]
     fn announce(&self, server: &WebServer) {
         for url in server.urls() {

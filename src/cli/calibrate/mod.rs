@@ -15,19 +15,19 @@ use super::{CliError, Losses};
 
 #[derive(Debug, Subcommand)]
 pub(super) enum CalibrateArguments {
-    /// Where the scan lies in the frame of the recorded poses, from points picked on both
+    /// Registration of the scan in the frame of the recorded poses, from points picked in both
     Scan(scan::ScanArguments),
-    /// Weight, centre of mass and bias of the sensor, from static segments in free air: of a
-    /// recording, or of an arm
+    /// Weight, centre of mass and sensor bias, from static segments in free air of a recording or
+    /// an arm
     Payload(payload::PayloadArguments),
-    /// The centre of the ball: in the tracked stylus, from a swing about it; in the flange of an
-    /// arm, from touches of one spot
+    /// Centre of the ball: in the tracked stylus, from a swing about it; in the flange of an arm,
+    /// from touches of one spot
     Tip(tip::TipArguments),
-    /// Compliance of arm and probe, from presses of an arm on one spot
+    /// Compliance of arm and probe, from an arm's presses on one spot
     Stiffness(stiffness::StiffnessArguments),
 }
 
-/// The verb.
+/// Runs `touchup calibrate`.
 pub(super) fn calibrate(arguments: &CalibrateArguments) -> Result<Losses, CliError> {
     match arguments {
         CalibrateArguments::Scan(arguments) => scan::scan(arguments),

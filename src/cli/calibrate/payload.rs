@@ -1,5 +1,5 @@
-//! `touchup calibrate payload`: payload identification, from static segments: of a recording, or of
-//! an arm that turns by itself.
+//! `touchup calibrate payload`: payload identification from static segments of a recording or of a
+//! self-turning arm.
 
 use std::path::PathBuf;
 
@@ -20,27 +20,27 @@ use crate::stylus::WrenchFrame;
 #[derive(Debug, Args)]
 #[group(id = "poses", required = true, multiple = false, args = ["bag", "samples", "robot"])]
 pub(in crate::cli) struct PayloadArguments {
-    /// A recording in which the stylus is held still in free air in several orientations
+    /// Recording with the stylus held still in free air in several orientations
     #[arg(long, value_name = "RECORDING", conflicts_with_all = ["cell", "true_payload"])]
     bag: Option<PathBuf>,
     /// Static poses, CSV: qx,qy,qz,qw,fx_n,fy_n,fz_n,tx_nm,ty_nm,tz_nm
     #[arg(long, value_name = "CSV", conflicts_with_all = ["cell", "true_payload"])]
     samples: Option<PathBuf>,
-    /// An arm that turns its probe in free air by itself; it needs --scene
+    /// Arm that turns its probe in free air by itself; needs --scene
     #[arg(long, value_name = "ARM")]
     robot: Option<RobotName>,
     #[command(flatten)]
     cell: CellArguments,
     #[command(flatten)]
     truth_payload: TruePayload,
-    /// Output, with --robot: each static segment as it is measured, a line of CSV each as --samples
-    /// reads them, so that none is lost whatever ends the measurement
+    /// Output, with --robot: each static segment at once as a CSV line in the format of --samples,
+    /// so that an aborted measurement loses none
     #[arg(long, value_name = "CSV", requires = "robot")]
     segments_out: Option<PathBuf>,
-    /// Axes of the wrench; default: those of the recording, or the sensor's for --samples
+    /// Axes of the wrench; default: as in the recording, or the sensor's for --samples
     #[arg(long, value_name = "AXES", conflicts_with = "robot")]
     wrench_axes: Option<Axes>,
-    /// Acceleration of gravity, by which the weight is divided
+    /// Acceleration of gravity, to convert weight to mass
     #[arg(long, value_name = "G", default_value = "9.81")]
     gravity_m_per_s2: f64,
     #[command(flatten)]
@@ -53,11 +53,11 @@ pub(in crate::cli) struct PayloadArguments {
 enum Axes {
     /// The sensor's own
     Sensor,
-    /// Those of the poses
+    /// Axes of the poses
     Pose,
 }
 
-/// The verb.
+/// Runs `touchup calibrate payload`.
 pub(super) fn payload(arguments: &PayloadArguments) -> Result<Losses, CliError> {
     let PayloadArguments {
         bag,

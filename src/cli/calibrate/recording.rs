@@ -1,4 +1,4 @@
-//! The recordings that a calibration reads.
+//! Recordings for calibrations.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use crate::cli::progress::WorkProgress;
 use crate::cli::recorded::RecordedFlags;
 use crate::scene::Scene;
 
-/// What is read of a recording made for a calibration.
+/// Recording flags of a calibration.
 #[derive(Debug, Args)]
 pub(super) struct RecordingFlags {
     #[command(flatten)]
@@ -18,7 +18,7 @@ pub(super) struct RecordingFlags {
 }
 
 impl RecordingFlags {
-    /// What `calibrate` makes of a recording, with a bar while it is replayed.
+    /// Calibration of a recording, with a progress bar during its replay.
     pub fn calibrate<C>(
         &self,
         bag: &Path,

@@ -1,4 +1,4 @@
-//! `touchup calibrate scan`: where the scan lies in space, from picked pairs.
+//! `touchup calibrate scan`: registration of the scan in space from point pairs.
 
 use std::path::PathBuf;
 
@@ -10,12 +10,11 @@ use crate::calibration::calibrate_scan;
 
 #[derive(Debug, Args)]
 pub(in crate::cli) struct ScanArguments {
-    /// Pairs of points, CSV: scan_x_mm,scan_y_mm,scan_z_mm,space_x_mm,space_y_mm,space_z_mm, where
-    /// wanted name, sigma_mm
+    /// Point pairs, CSV: scan_x_mm,scan_y_mm,scan_z_mm,space_x_mm,space_y_mm,space_z_mm, optional
+    /// name, sigma_mm
     #[arg(long, value_name = "CSV")]
     pairs: PathBuf,
-    /// A recording in which the stylus dwells on each point for a second, in the order of the file,
-    /// which then needs no columns of space
+    /// Recording with a dwell of 1 s on each point in file order; it replaces the space columns
     #[arg(long, value_name = "RECORDING")]
     bag: Option<PathBuf>,
     /// Standard deviation of a pair per axis, mm; default: from the residuals
@@ -27,7 +26,7 @@ pub(in crate::cli) struct ScanArguments {
     target: CalibrationTarget,
 }
 
-/// The verb.
+/// Runs `touchup calibrate scan`.
 pub(super) fn scan(arguments: &ScanArguments) -> Result<Losses, CliError> {
     let ScanArguments {
         pairs,

@@ -12,7 +12,7 @@ use crate::calibration::{Calibration, StiffnessFound};
 pub(in crate::cli) struct StiffnessArguments {
     #[command(flatten)]
     arm: ArmArguments,
-    /// A flat place of a stiff part with nothing within 15 mm, in the frame of the scan, mm
+    /// Flat spot on a stiff part, clear for 15 mm around, in the frame of the scan, mm
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
     spot: String,
     /// Number of presses
@@ -24,7 +24,7 @@ pub(in crate::cli) struct StiffnessArguments {
     target: CalibrationTarget,
 }
 
-/// The verb.
+/// Runs `touchup calibrate stiffness`.
 pub(super) fn stiffness(arguments: &StiffnessArguments) -> Result<Losses, CliError> {
     let StiffnessArguments {
         arm,

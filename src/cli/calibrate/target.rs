@@ -1,4 +1,4 @@
-//! Where the result of a calibration goes: into a scene.
+//! Output scene of a calibration.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -12,18 +12,18 @@ use crate::cli::{CliError, Losses, check_kept, not_written, print_report};
 use crate::io::atomic::write_atomically;
 use crate::scene::Scene;
 
-/// Error of a calibration with an arm but without a scene.
+/// Error message for a calibration with an arm but no scene.
 const NO_SCENE: &str =
     "--scene is needed: it has the pose of the arm's base and the volume that it must never leave";
 
-/// Where the result goes, and how it is printed.
+/// Output scene and print format of a calibration.
 #[derive(Debug, Args)]
 pub(super) struct CalibrationTarget {
-    /// The scene to put the result into: all else in it stays as written. Default, and where --out
-    /// is the same and no file yet: a whole scene with every key explained
+    /// Scene to put the result into; all else in it stays as written. Default, also if --out names
+    /// the same new file: a whole scene with every key explained
     #[arg(long, value_name = "YAML")]
     scene: Option<PathBuf>,
-    /// Where the scene goes; may be the one that --scene names
+    /// Output scene; may be the same file as --scene
     #[arg(long, value_name = "YAML")]
     pub out: PathBuf,
     /// Prints the result as one JSON object
@@ -31,22 +31,22 @@ pub(super) struct CalibrationTarget {
     json: bool,
 }
 
-/// A scene with its text.
+/// Scene and its YAML text.
 pub(super) struct DraftScene {
     text: String,
-    /// what the text says
+    /// Parsed scene.
     pub scene: Scene,
 }
 
 impl DraftScene {
-    /// Refuses a scene that does not tell the radius of the ball.
+    /// Refuses a scene without tip radius.
     pub fn require_radius(&self) -> Result<(), CliError> {
         Ok(self.scene.clone().tell_radius(&self.text, None)?)
     }
 }
 
 impl CalibrationTarget {
-    /// Refuses to write over `input`, and reads the scene.
+    /// Refuses to overwrite `input`, and reads the scene.
     pub fn open(&self, flag: &str, input: &Path) -> Result<DraftScene, CliError> {
         check_kept(flag, input, &self.out)?;
         self.open_scene()
@@ -62,7 +62,7 @@ impl CalibrationTarget {
         Ok(DraftScene { text, scene })
     }
 
-    /// Reads the scene, which a calibration with an arm needs, and returns its path too.
+    /// Reads the scene, mandatory for a calibration with an arm; also returns its path.
     pub fn open_for_arm(&self) -> Result<(&Path, DraftScene), CliError> {
         let scene = self
             .scene
@@ -71,7 +71,7 @@ impl CalibrationTarget {
         Ok((scene, self.open_scene()?))
     }
 
-    /// Puts what was found into the scene and prints what it was; what the recording lacks.
+    /// Writes the result into the scene and prints it; returns the losses of the recording.
     pub fn write(
         &self,
         draft: &DraftScene,

@@ -1,5 +1,5 @@
-//! `touchup calibrate tip`: where the ball is: in the tracked stylus, from a swing about it; in the
-//! flange of an arm, from touches of one flat spot with a probe that leans.
+//! `touchup calibrate tip`: ball centre in the tracked stylus, from a swing about it, or in the
+//! flange of an arm, from touches of one flat spot with a leaning probe.
 
 use std::path::PathBuf;
 
@@ -17,20 +17,19 @@ use crate::sim::ArmParams;
 #[derive(Debug, Args)]
 #[group(id = "swing", required = true, multiple = false, args = ["bag", "robot"])]
 pub(in crate::cli) struct TipArguments {
-    /// A recording in which the ball sits in a cone or divot while the stylus is swung to all sides
+    /// Recording of a swing of the stylus to all sides with the ball in a cone or divot
     #[arg(long, value_name = "RECORDING", conflicts_with_all = ["cell", "spot", "truth_tip_mm"])]
     bag: Option<PathBuf>,
-    /// An arm that touches --spot with its probe leaning to all sides; it needs --scene
+    /// Arm that touches --spot with its probe leaning to all sides; needs --scene
     #[arg(long, value_name = "ARM", requires = "spot")]
     robot: Option<RobotName>,
     #[command(flatten)]
     cell: CellArguments,
-    /// With --robot: a flat place of the part with nothing within 20 mm, in the frame of the scan,
-    /// mm
+    /// With --robot: flat spot on the part, clear for 20 mm around, in the frame of the scan, mm
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
     spot: Option<String>,
-    /// True position of the ball of a simulated arm in the flange, mm; default:
-    /// robot.tip_position_mm of the scene
+    /// True ball centre of a simulated arm in the flange, mm; default: robot.tip_position_mm of the
+    /// scene
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
     truth_tip_mm: Option<String>,
     #[command(flatten)]
@@ -41,7 +40,7 @@ pub(in crate::cli) struct TipArguments {
     target: CalibrationTarget,
 }
 
-/// The verb.
+/// Runs `touchup calibrate tip`.
 pub(super) fn tip(arguments: &TipArguments) -> Result<Losses, CliError> {
     let TipArguments {
         bag,
@@ -62,7 +61,7 @@ pub(super) fn tip(arguments: &TipArguments) -> Result<Losses, CliError> {
     target.write(&draft, calibration)
 }
 
-/// - `spot`: as it was written, X,Y,Z in mm.
+/// - `spot`: text X,Y,Z in mm.
 fn tip_by_arm(arguments: &TipArguments, robot: RobotName, spot: &str) -> Result<Losses, CliError> {
     let TipArguments {
         cell,

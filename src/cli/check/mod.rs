@@ -1,5 +1,5 @@
-//! `touchup check`: whether an arm measures one spot and spheres of known diameter as they are,
-//! before it is trusted with a part.
+//! `touchup check`: accuracy test of an arm on one spot and on spheres of known diameter before it
+//! measures a part.
 
 mod report;
 
@@ -18,12 +18,11 @@ use crate::scene::{CheckRecord, Scene};
 use report::SphereResults;
 pub(super) use report::{CheckReport, Gates};
 
-/// Allowed number of touches; with three each side is approached, and the repeatability is known.
+/// Allowed number of touches; three are the minimum for both sides and a repeatability.
 const TOUCHES: std::ops::RangeInclusive<usize> = 3..=100;
-/// Diameters of spheres, m: smaller ones a ball slips off, larger ones an arm does not reach
-/// around.
+/// Diameters of spheres, m: a ball slips off smaller ones, an arm cannot reach around larger ones.
 const DIAMETERS: std::ops::RangeInclusive<f64> = 3e-3..=100e-3;
-/// What a check touches a spot with, unless it is told.
+/// Default number of touches of a spot.
 pub(super) const SPOT_TOUCHES: usize = 10;
 
 #[derive(Debug, Args)]
@@ -34,14 +33,14 @@ pub(super) struct CheckArguments {
     /// The scene, with `robot` (config/probe.yaml is an example)
     #[arg(long, value_name = "YAML")]
     scene: PathBuf,
-    /// A flat place of the part with nothing within 15 mm, in the frame of the scan, mm
+    /// Flat spot on the part, clear for 15 mm around, in the frame of the scan, mm
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
     spot: Option<String>,
-    /// Number of touches of the spot, every second one from the other side
+    /// Number of touches of the spot, from alternating sides
     #[arg(long, value_name = "N", default_value_t = SPOT_TOUCHES, requires = "spot")]
     touches: usize,
-    /// A sphere of known diameter within 2 mm of a place in the frame of the scan, mm; free from
-    /// above, its post below; repeat for each place
+    /// Sphere of known diameter within 2 mm of a place in the frame of the scan, mm; free from
+    /// above, its post below; repeat for each
     #[arg(
         long = "sphere",
         value_name = "X,Y,Z,DIAMETER",
@@ -54,14 +53,14 @@ pub(super) struct CheckArguments {
     /// Gate: largest distance between two touches of the spot, µm
     #[arg(long, value_name = "G", default_value_t = Gates::default().spot_um)]
     gate_um: f64,
-    /// Gate: largest error of a sphere over the workspace, and largest scatter of its centre from
-    /// one orientation of the probe to the next, µm
+    /// Gate: largest error of a sphere over the workspace, and largest scatter of its centre over
+    /// the probe's orientations, µm
     #[arg(long, value_name = "G", default_value_t = Gates::default().sphere_um)]
     sphere_gate_um: f64,
     /// Temperature of the cell, °C; default: robot.temperature_c of the scene
     #[arg(long, value_name = "T", allow_hyphen_values = true)]
     temperature_c: Option<f64>,
-    /// Output: the record of this check, which robot.check of a scene names
+    /// Output: the record of this check, for robot.check of a scene
     #[arg(long, value_name = "JSON")]
     out: Option<PathBuf>,
     #[command(flatten)]
@@ -143,7 +142,7 @@ impl CheckArguments {
     }
 }
 
-/// A spot that was written X,Y,Z in mm, and how often it is touched.
+/// Spot from the text X,Y,Z in mm, and its number of touches.
 fn spot_of(text: &str, touches: usize) -> Result<(Point3<f64>, usize), CliError> {
     let place = Point3::from(millimetres("--spot", text)?);
     let (least, most) = (TOUCHES.start(), TOUCHES.end());
@@ -154,7 +153,7 @@ fn spot_of(text: &str, touches: usize) -> Result<(Point3<f64>, usize), CliError>
     Ok((place, touches))
 }
 
-/// A sphere that was written X,Y,Z,DIAMETER in mm.
+/// Sphere from the text X,Y,Z,DIAMETER in mm.
 fn sphere_of(text: &str) -> Result<ReferenceSphere, CliError> {
     let wrong = || {
         CliError::usage(format!(
@@ -170,7 +169,7 @@ fn sphere_of(text: &str) -> Result<ReferenceSphere, CliError> {
     }
 }
 
-/// Touches a spot so many times, and then each sphere.
+/// Touches a spot the given number of times, and then each sphere.
 pub(super) fn touched(
     prober: &mut Prober<'_>,
     spot: Option<&(Point3<f64>, usize)>,
@@ -193,9 +192,9 @@ pub(super) fn touched(
     Ok(touches)
 }
 
-/// Touches one spot again and again.
+/// Touches one spot repeatedly.
 ///
-/// - `spot`: as it was written, X,Y,Z in mm.
+/// - `spot`: text X,Y,Z in mm.
 pub(super) fn repeated(
     arm: &ArmArguments,
     scene: &Path,
@@ -218,8 +217,7 @@ pub(super) fn repeated(
 }
 
 impl CheckReport {
-    /// - `scene`: that the arm was checked by; `temperature_c`: of the cell, where it is not as the
-    ///   scene has it.
+    /// - `scene`: scene of the check; `temperature_c`: cell temperature, if not as in the scene.
     #[expect(clippy::too_many_lines)]
     pub(super) fn of(
         touches: &CheckedTouches,

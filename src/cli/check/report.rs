@@ -1,4 +1,4 @@
-//! What a check found, as a table and as its record.
+//! Results of a check as a table and as its record.
 
 use std::fmt;
 
@@ -11,20 +11,20 @@ use crate::probing::execute::{
 };
 use crate::scene::CheckRecord;
 
-/// What a check has to keep, and how well the spheres are known.
+/// Gates of a check, and the uncertainty of the sphere diameters.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub(in crate::cli) struct Gates {
-    /// largest distance between two touches of the spot
+    /// Largest distance between two touches of the spot.
     pub spot_um: f64,
-    /// largest error of a centre over the workspace, and largest scatter of one over the
-    /// orientations
+    /// Largest error of a centre over the workspace, and largest scatter of a centre over the
+    /// orientations.
     pub sphere_um: f64,
-    /// standard uncertainty of the diameters
+    /// Standard uncertainty of the diameters.
     pub diameter_sigma_um: f64,
 }
 
 impl Default for Gates {
-    /// Of a UR, whose maker states ±0.03 mm: ten touches of 0.03 mm are within 0.15 mm in 98 of 100
+    /// For a UR, with ±0.03 mm by its maker: ten touches of 0.03 mm are within 0.15 mm in 98 of 100
     /// checks.
     fn default() -> Self {
         Self {
@@ -35,11 +35,10 @@ impl Default for Gates {
     }
 }
 
-/// A radius that differs from another by more than so many standard uncertainties of the difference
-/// has jumped.
+/// Limit for a jump between two radii, in standard uncertainties of the difference.
 const JUMPS: f64 = 3.0;
 
-/// The record, and all that it comes from.
+/// Record of a check, and its sources.
 #[derive(Debug, Serialize)]
 pub(in crate::cli) struct CheckReport {
     #[serde(flatten)]
@@ -52,8 +51,7 @@ pub(in crate::cli) struct CheckReport {
 }
 
 impl CheckReport {
-    /// - `record`: when, and of which arm; `radii`: whose, the radius and its standard uncertainty,
-    ///   mm.
+    /// - `record`: time and arm; `radii`: name, radius and standard uncertainty, mm.
     pub(super) fn judged(
         record: CheckRecord,
         spot: Option<&Repeatability>,
@@ -62,7 +60,7 @@ impl CheckReport {
         radii: &[(&str, Option<f64>, f64)],
     ) -> Self {
         let spot = spot.map(CheckedSpot::of);
-        // pooled, by the numbers that each is known by
+        // pooled, weighted by degrees of freedom
         let scatters = [
             spot.as_ref()
                 .map(|spot| (spot.std_um / 1e3, spot.touches.len() - 1)),
@@ -139,7 +137,7 @@ impl CheckReport {
             .collect()
     }
 
-    /// Why the check did not pass, and what else should be looked at.
+    /// Failed gates; logs the warnings.
     pub(super) fn losses(&self) -> Losses {
         let CheckRecord {
             failures, warnings, ..
@@ -152,14 +150,14 @@ impl CheckReport {
 }
 
 reported! {
-    /// Of one spot.
+    /// Results of one spot.
     struct CheckedSpot, fn of(found: &Repeatability) {
         spot_mm: [f64; 3] = (found.place * 1e3).coords.into(),
         normal: [f64; 3] = found.normal.into_inner().into(),
         touches: Vec<CheckedTouch> = found.touches.iter().zip(found.deviations()).map(CheckedTouch::of).collect(),
         range_um: f64 = found.range() * 1e6,
         std_um: f64 = found.deviation() * 1e6,
-        /// first side less the other
+        /// First side minus the other.
         reversal_um: f64 = found.reversal() * 1e6,
         stiffness_n_per_mm: f64 = found.stiffness()[0] / 1e3,
         stiffness_std_n_per_mm: f64 = found.stiffness()[1] / 1e3,
@@ -169,7 +167,7 @@ reported! {
 reported! {
     struct CheckedTouch, fn of(found: (&SpotTouch, f64)) {
         side: i8 = found.0.side,
-        /// outward from the mean of all
+        /// Outward from the mean of all.
         deviation_um: f64 = found.1 * 1e6,
         std_um: f64 = found.0.sigma * 1e6,
         stiffness_n_per_mm: f64 = found.0.stiffness[0] / 1e3,
@@ -178,13 +176,13 @@ reported! {
 }
 
 reported! {
-    /// Of all spheres.
+    /// Results of all spheres.
     pub(super) struct SphereResults, pub(super) fn of(found: &WorkspaceCheck, told: &[ReferenceSphere], touched: &[SphereTouches]) {
         repeatability_um: f64 = found.repeatability * 1e6,
         degrees_of_freedom: usize = found.degrees_of_freedom,
         tip_radius_mm: f64 = found.tip_radius * 1e3,
         tip_radius_sigma_mm: f64 = found.tip_radius_sigma * 1e3,
-        /// along each axis
+        /// Along each axis.
         orientation_scatter_um?: f64 = found.orientation_scatter.map(|scatter| scatter * 1e6),
         growth_mm_per_m?: f64 = found.growth.map(|growth| growth * 1e3),
         growth_degrees_of_freedom: usize = found.growth_degrees_of_freedom,
@@ -211,13 +209,13 @@ reported! {
         sphere: usize = number,
         told_mm: [f64; 3] = (told.centre * 1e3).coords.into(),
         diameter_mm: f64 = told.radius * 2e3,
-        /// where the arm has it
+        /// Centre from the arm's touches.
         found_mm?: [f64; 3] = place.map(|place| (place.found * 1e3).coords.into()),
-        /// after the rigid motion that fits all spheres best
+        /// Residual after the best-fit rigid motion of all spheres.
         error_mm?: [f64; 3] = place.map(|place| (place.error * 1e3).into()),
         orientations: Vec<CheckedOrientation> =
             touched.orientations.iter().zip(fits).map(|(one, fit)| CheckedOrientation::of(one, fit, told)).collect(),
-        /// orientations that the arm does not get to, and why
+        /// Orientations out of the arm's reach, with reasons.
         #[serde(skip_serializing_if = "Vec::is_empty")]
         not_reached: Vec<String> = touched.not_reached.iter().map(NotReached::to_string).collect(),
     }
@@ -230,13 +228,13 @@ reported! {
         touches: usize = one.centres.len(),
         center_mm: [f64; 3] = (fit.centre * 1e3).coords.into(),
         tip_radius_mm: f64 = (fit.radius - told.radius) * 1e3,
-        /// of the touches from the sphere
+        /// Residual standard deviation of the touches from the sphere.
         residual_um: f64 = (fit.residual_square / fit.degrees_of_freedom as f64).sqrt() * 1e6,
     }
 }
 
 impl SphereResults {
-    /// Where the radius differs from another by more than chance.
+    /// Message if the radius differs from another by more than chance.
     fn jump(&self, whose: &str, radius_mm: f64, sigma_mm: f64) -> Option<String> {
         let Self {
             tip_radius_mm,

@@ -1,4 +1,4 @@
-//! The mesh brought onto the truth, and how that is reported.
+//! Alignment of the mesh to the truth, and its report.
 
 use std::fmt;
 use std::path::Path;
@@ -19,40 +19,40 @@ use crate::io::pairs_file::read_pairs;
 use crate::mesh::{TriMesh, VertexId};
 use crate::threads::Threads;
 
-/// Points of the mesh that are brought onto the truth.
+/// Number of points of the mesh for one alignment.
 const POINTS: f64 = 100_000.0;
-/// … where that is done for each of many motions.
+/// Number of points of the mesh for each of many trial motions.
 const POINTS_EACH: f64 = 20_000.0;
 
-/// What `--json` prints of the alignment.
+/// Alignment in the output of `--json`.
 #[derive(Debug, Default, Serialize)]
 pub(super) struct Alignment {
     method: &'static str,
     #[serde(flatten)]
     motion: MotionReport,
-    /// of the points to the tangent planes, or of the pairs
+    /// Distances of the points from the tangent planes, or of the pairs.
     #[serde(skip_serializing_if = "Option::is_none")]
     rms_mm: Option<f64>,
-    /// point to plane
+    /// Point to plane.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
     fit: Option<FitReport>,
-    /// by features
+    /// By features.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
     explained: Option<Explained>,
-    /// of each pair
+    /// Residual of each pair.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     residuals: Vec<Residual>,
-    /// small motions that leave the fit as it is
+    /// Small motions without effect on the fit.
     undetermined: Vec<Loose>,
 }
 
 reported! {
-    /// Moves the mesh, as it is in its file, onto the truth.
+    /// Motion from the mesh in its file onto the truth.
     #[derive(Default)]
     struct MotionReport, fn of(motion: &Isometry3<f64>) {
-        /// rows of the rotation
+        /// Rows of the rotation.
         rotation: [[f64; 3]; 3] = motion.rotation.to_rotation_matrix().matrix().transpose().into(),
-        /// and then the shift
+        /// Shift after the rotation.
         translation_mm: [f64; 3] = (motion.translation.vector * 1e3).into(),
     }
 }
@@ -67,11 +67,11 @@ reported! {
 
 reported! {
     struct Explained, fn of(alternative: &Alternative, counts: [usize; 2]) {
-        /// features of the mesh that lie on one of the truth
+        /// Features of the mesh that coincide with a feature of the truth.
         explained_features: usize = alternative.explained.len(),
         mesh_features: usize = counts[0],
         truth_features: usize = counts[1],
-        /// share of the mesh's surface that lies on the truth
+        /// Share of the mesh's surface that lies on the truth.
         agreeing_share: Option<f64> = alternative.agreeing,
     }
 }
@@ -86,22 +86,22 @@ reported! {
 }
 
 reported! {
-    /// An unconstrained motion: a shift along and a turn about a point.
+    /// Unconstrained motion: a shift along and a turn about a point.
     struct Loose, fn of(motion: &Motion, fit: &IcpFit) {
-        /// of the point `about_mm`, times any length
+        /// Shift of the point `about_mm`, times any length.
         shift: [f64; 3] = motion.shift.into(),
-        /// direction of the axis, times an angle per mm of the shift
+        /// Direction of the axis, times an angle per mm of the shift.
         turn_rad_per_mm: [f64; 3] = (motion.turn / fit.lever * 1e-3).into(),
         about_mm: [f64; 3] = (fit.centre.coords * 1e3).into(),
     }
 }
 
 reported! {
-    /// The motions of which one must be chosen.
+    /// Alternative motions for the user's choice.
     struct Choices, fn of(alternatives: &[Alternative], counts: [usize; 2], error: &FeaturesError) {
         ambiguous: Vec<Choice> =
             (1..).zip(alternatives).map(|(number, one)| Choice::of(number, one, counts)).collect(),
-        /// the axis about which each may be turned
+        /// Axis of the free turn of each motion.
         free_turn?: FreeTurnReport = match error {
             FeaturesError::FreeTurn { turn, .. } => Some(FreeTurnReport::of(turn)),
             _ => None,
@@ -118,24 +118,24 @@ reported! {
 
 reported! {
     struct Choice, fn of(number: usize, found: &Alternative, counts: [usize; 2]) {
-        /// as --alternative takes it
+        /// Number for --alternative.
         alternative: usize = number,
         #[serde(flatten)]
         motion: MotionReport = MotionReport::of(&found.source_to_target),
         #[serde(flatten)]
         explained: Explained = Explained::of(found, counts),
         rms_mm: Option<f64> = found.icp.as_ref().map(|fit| fit.rms * 1e3),
-        /// against the first
+        /// Turn relative to the first.
         turn_deg: f64 = found.differs[0].norm().to_degrees(),
         turn_axis: [f64; 3] = found.differs[0].try_normalize(1e-9).unwrap_or_default().into(),
-        /// of the middle of the features, against the first
+        /// Shift of the features' centre, relative to the first.
         shift_mm: [f64; 3] = (found.differs[1] * 1e3).into(),
     }
 }
 
 type Aligned = Result<(Isometry3<f64>, Option<Alignment>), CliError>;
 
-/// The motion that brings `mesh` onto the truth from roughly in place, and its report.
+/// Motion that aligns `mesh` to the truth from roughly in place, and its report.
 ///
 /// # Errors
 /// [`CliError`].
@@ -155,12 +155,12 @@ pub(super) fn aligned_by_icp(mesh: &TriMesh, truth: IndexedMesh<'_>, seed: u64) 
     Ok((fit.source_to_target, Some(alignment)))
 }
 
-/// The same from anywhere, by features.
+/// Motion that aligns `mesh` to the truth from anywhere, by features, and its report.
 ///
-/// - `alternative`: which of several motions, from 1 on.
+/// - `alternative`: number of the motion among several, from 1 on.
 ///
 /// # Errors
-/// [`CliError`], after the alternatives went to stdout; [`CliError::usage`] where there are fewer.
+/// [`CliError`], after printing the alternatives to stdout; [`CliError::usage`] if there are fewer.
 pub(super) fn aligned_by_features(
     mesh: &TriMesh,
     truth: IndexedMesh<'_>,
@@ -215,7 +215,7 @@ pub(super) fn aligned_by_features(
     Ok((chosen.source_to_target, Some(alignment)))
 }
 
-/// The motion that fits pairs of picked points; `scan` is the mesh and `space` the truth.
+/// Motion that fits picked point pairs; `scan` is the mesh and `space` the truth.
 ///
 /// # Errors
 /// [`CliError`], [`CliError::calibration`].
@@ -291,7 +291,7 @@ impl Alignment {
         }
     }
 
-    /// The method and the residuals of the alignment.
+    /// Method and residuals of the alignment.
     pub(super) fn in_short(&self) -> String {
         let rms = self
             .rms_mm
@@ -299,7 +299,7 @@ impl Alignment {
         format!("aligned by {}{rms}", self.method)
     }
 
-    /// The points that took part, where there were any.
+    /// Points of the alignment, if any.
     pub(super) fn details(&self) -> Option<String> {
         let FitReport {
             points,

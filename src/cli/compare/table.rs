@@ -13,7 +13,7 @@ use crate::compare::{
 use crate::mesh::TriMesh;
 
 reported! {
-    /// What `--json` prints.
+    /// Output of `--json`.
     pub(in crate::cli) struct CompareReport, pub fn of(
         shapes: [(&Path, &TriMesh); 2],
         aligned: Option<Alignment>,
@@ -23,9 +23,9 @@ reported! {
         mesh: ShapeReport = ShapeReport::of(shapes[0].0, shapes[0].1),
         truth: ShapeReport = ShapeReport::of(shapes[1].0, shapes[1].1),
         alignment?: Alignment = aligned,
-        /// the scan, with --before
+        /// The scan, with --before.
         before?: ComparisonReport = scanned.map(ComparisonReport::of),
-        /// the mesh
+        /// The mesh.
         after: ComparisonReport = ComparisonReport::of(refined),
     }
 }
@@ -35,31 +35,31 @@ reported! {
         file: String = path.display().to_string(),
         vertices: usize = mesh.vertex_count(),
         faces: usize = mesh.face_count(),
-        /// sides of the box around it
+        /// Sides of its bounding box.
         size_mm: [f64; 3] = (diagonal(mesh) * 1e3).into(),
     }
 }
 
-/// From the lowest to the highest corner of the box around a mesh, m.
+/// Diagonal of the bounding box from its lowest to its highest corner, m.
 pub(super) fn diagonal(mesh: &TriMesh) -> Vector3<f64> {
     let [low, high] = mesh.bounds();
     high - low
 }
 
-/// What `--json` prints of one mesh as `after`, as JSON.
+/// Output of `--json` for one mesh as `after`, as JSON.
 pub fn comparison_json(comparison: &Comparison) -> serde_json::Value {
     serde_json::to_value(ComparisonReport::of(comparison))
         .expect("finite numbers and names alone cannot fail")
 }
 
 reported! {
-    /// What `--json` prints of one mesh.
+    /// Output of `--json` for one mesh.
     struct ComparisonReport, fn of(comparison: &Comparison) {
-        /// points spread over each surface
+        /// Density of the sample points on each surface.
         density_per_mm2: f64 = comparison.density * 1e-6,
-        /// of the true surface, which the mesh does not show: never scanned, or missing
+        /// Share of the true surface without counterpart on the mesh: never scanned, or missing.
         unseen_share: f64 = comparison.unseen,
-        /// all, touched, guessed, untouched, where present
+        /// All, touched, guessed, untouched, if present.
         regions: Vec<DeviationRow> = comparison.regions.iter().map(DeviationRow::of).collect(),
     }
 }
@@ -73,9 +73,9 @@ reported! {
         cloud_to_truth: Option<SummaryReport> = part.cloud_to_truth.as_ref().map(SummaryReport::without_sign),
         truth_to_cloud: Option<SummaryReport> = part.truth_to_cloud.as_ref().map(SummaryReport::without_sign),
         normals: Option<NormalsReport> = part.tilt.as_ref().map(NormalsReport::of),
-        /// of `mesh_to_truth`
+        /// Of `mesh_to_truth`.
         histogram: HistogramReport = HistogramReport::of(&part.histogram),
-        /// of `mesh_to_truth`, within --tolerance-mm
+        /// Share of `mesh_to_truth` within --tolerance-mm.
         within_tolerance_share?: f64 = part.within_tolerance,
     }
 }
@@ -90,7 +90,7 @@ reported! {
         p95_mm: f64 = summary.p95 * 1e3,
         p99_mm: f64 = summary.p99 * 1e3,
         max_mm: f64 = summary.max * 1e3,
-        /// not of clouds, which have no sides
+        /// `None` for clouds, which have no sides.
         bias_mm?: f64 = Some(summary.bias * 1e3),
     }
 }
@@ -108,7 +108,7 @@ reported! {
     struct NormalsReport, fn of(tilt: &TiltSummary) {
         median_deg: f64 = tilt.median.to_degrees(),
         p95_deg: f64 = tilt.p95.to_degrees(),
-        /// of the area, more than 90 degrees off
+        /// Share of the area, more than 90 degrees off.
         flipped_share: f64 = tilt.flipped,
     }
 }
@@ -132,7 +132,7 @@ fn name_of(region: Option<SupportRegion>) -> &'static str {
     }
 }
 
-/// The numbers of a picture: of the touched part where there is one, else of all.
+/// Numbers for a picture: of the touched part if any, else of all.
 pub(super) fn shown(comparison: &Comparison) -> Option<&RegionComparison> {
     let touched = comparison
         .regions
@@ -141,7 +141,7 @@ pub(super) fn shown(comparison: &Comparison) -> Option<&RegionComparison> {
     touched.or(comparison.regions.first())
 }
 
-/// Caption of a picture: the deviation, the share within tolerance, and what the colours clip.
+/// Caption of a picture: deviation, share within tolerance, and share beyond the colours.
 pub(super) fn note(comparison: &Comparison, tolerance_mm: Option<f64>) -> String {
     let Some(part) = shown(comparison) else {
         return String::new();
@@ -170,7 +170,7 @@ pub(super) fn note(comparison: &Comparison, tolerance_mm: Option<f64>) -> String
 const HEAD: &str = "                            mean      rms   median      p95      p99      max     bias    points";
 
 impl CompareReport {
-    /// Sizes of both, the points of the alignment, and the table of all distances.
+    /// Sizes of both, points of the alignment, and the table of all distances.
     pub(super) fn details(&self) -> String {
         let size = |(what, shape): (&str, &ShapeReport)| {
             let ([x, y, z], faces) = (shape.size_mm, counted(shape.faces, "face", "faces"));
@@ -194,8 +194,8 @@ impl CompareReport {
     }
 }
 
-/// The verdict: deviation of the mesh, of the touched part where known, and of the mesh before.
-/// Then the alignment.
+/// Verdict: deviation of the mesh, of the touched part if known, and of the mesh before; then the
+/// alignment.
 impl fmt::Display for CompareReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let places = [("touched", "where touched"), ("all", "over all")];
@@ -247,7 +247,7 @@ impl fmt::Display for CompareReport {
 }
 
 impl ComparisonReport {
-    /// A region and its distances to the truth, where it has any.
+    /// Row of a region and its distances to the truth, if any.
     fn row(&self, region: &str) -> Option<(&DeviationRow, &SummaryReport)> {
         let row = self.regions.iter().find(|row| row.region == region)?;
         Some((row, row.mesh_to_truth.as_ref()?))
@@ -255,7 +255,7 @@ impl ComparisonReport {
 }
 
 impl DeviationRow {
-    /// What a part is accepted by.
+    /// Acceptance figures of a part.
     fn worst(&self) -> String {
         let errors = self.mesh_to_truth.as_ref();
         let errors = errors.map(|errors| {

@@ -1,4 +1,4 @@
-//! The flags of `touchup inspect`.
+//! Flags of `touchup inspect`.
 
 use std::path::PathBuf;
 
@@ -16,56 +16,53 @@ use crate::io::mesh_file::MeshUnit;
 
 #[derive(Debug, Args)]
 pub(in crate::cli) struct InspectArguments {
-    /// The features, as refine, features and probe write them, or the folder of a session
+    /// Features, as refine, features and probe write them, or the folder of a session
     #[arg(value_name = "FEATURES|SESSION")]
     pub features: PathBuf,
-    /// Nominal values and tolerances, CSV or JSON (docs/inspect.md), or a CAD mesh whose features
-    /// are the nominal ones: PLY, STL, OBJ
+    /// Nominal values and tolerances, CSV or JSON (docs/inspect.md), or a CAD mesh (PLY, STL, OBJ)
+    /// with the nominal features
     #[arg(long, value_name = "FILE", required_unless_present = "write_nominal")]
     pub nominal: Option<PathBuf>,
     /// Unit of the coordinates in the CAD mesh of --nominal
     #[arg(long, value_name = "U", default_value = "mm")]
     pub nominal_unit: MeshUnit,
-    /// General tolerance for sizes that have none of their own
+    /// General tolerance for sizes without their own
     #[arg(long, value_name = "CLASS", value_parser = general_tolerance, conflicts_with = "tolerance_mm")]
     pub general: Option<GeneralTolerance>,
-    /// … or the same tolerance ± for all of them, mm
+    /// Tolerance ± for all sizes without their own, mm; instead of --general
     #[arg(long, value_name = "T")]
     pub tolerance_mm: Option<f64>,
     /// With a CAD mesh: also the position of each hole, slot, pocket and boss, within a zone of
     /// this diameter, mm
     #[arg(long, value_name = "D")]
     pub position_mm: Option<f64>,
-    /// A feature is the nominal one where its centre is no farther off than this across its axis,
-    /// mm
+    /// Largest distance across the axis between the centres of a feature and its nominal one, mm
     #[arg(long, value_name = "R", default_value_t = InspectionParams::default().match_mm)]
     pub match_mm: f64,
-    /// Brings drawing and part into one frame: best-fit, over all features that both have; or
-    /// datums=NAME,NAME,NAME with names of characteristics, primary to tertiary. Positions are then
-    /// about the frame of the drawing
+    /// Aligns drawing and part: best-fit, over all common features; or datums=NAME,NAME,NAME, names
+    /// of characteristics, primary to tertiary. Positions are then in the drawing's frame
     #[arg(long, value_name = "HOW")]
     pub align: Option<AlignmentMethod>,
-    /// Writes nominal values to be edited, CSV or JSON, from the CAD mesh of --nominal or else from
+    /// Writes nominal values for editing, CSV or JSON, from the CAD mesh of --nominal or else from
     /// FEATURES; inspects nothing
     #[arg(long, value_name = "FILE")]
     pub write_nominal: Option<PathBuf>,
-    /// The touches behind the features; by default touches.csv beside them
+    /// Touches behind the features; default: touches.csv beside them
     #[arg(long, value_name = "CSV")]
     pub touches: Option<PathBuf>,
-    /// The mesh of the picture; by default refined.ply beside the features
+    /// Mesh of the picture; default: refined.ply beside the features
     #[arg(long, value_name = "MESH")]
     pub mesh: Option<PathBuf>,
-    /// Unit of its coordinates
+    /// Unit of the coordinates in the file of --mesh
     #[arg(long, value_name = "U", default_value = "mm")]
     pub mesh_unit: MeshUnit,
-    /// The scene that was touched with, for the state of its calibration; by default that of the
-    /// session
+    /// Scene of the touches, for the state of its calibration; default: the session's
     #[arg(long, value_name = "YAML")]
     pub scene: Option<PathBuf>,
-    /// How it is decided: guard bands, or the measured value alone
+    /// Decision rule: guard bands, or the measured value alone
     #[arg(long, value_name = "RULE", value_parser = decision_rule, default_value = DecisionParams::default().rule.name())]
     pub rule: DecisionRule,
-    /// Probability of conformity that a pass needs, and of nonconformity that a fail needs
+    /// Minimum probability of conformity for a pass, and of nonconformity for a fail
     #[arg(long, value_name = "P", default_value_t = DecisionParams::default().confidence)]
     pub confidence: f64,
     /// Coverage factor of the expanded uncertainties U = k u
@@ -77,10 +74,10 @@ pub(in crate::cli) struct InspectArguments {
     /// Serial number of the part
     #[arg(long, value_name = "S")]
     pub serial: Option<String>,
-    /// Who inspected
+    /// Name of the inspector
     #[arg(long, value_name = "NAME")]
     pub operator: Option<String>,
-    /// From which direction the picture is taken; by default the side that was touched
+    /// View direction of the picture; default: the touched side
     #[arg(
         long,
         value_name = "X,Y,Z",
@@ -89,7 +86,7 @@ pub(in crate::cli) struct InspectArguments {
         allow_negative_numbers = true
     )]
     pub view: Option<Vec<f64>>,
-    /// Output: the report, one file of HTML that prints
+    /// Output: the report, one printable HTML file
     #[arg(long, value_name = "HTML")]
     pub out: Option<PathBuf>,
     /// Output: the characteristics as a table
@@ -104,7 +101,7 @@ pub(in crate::cli) struct InspectArguments {
 }
 
 impl InspectArguments {
-    /// Checks flags and places of outputs before the work begins.
+    /// Checks flags and outputs before the work begins.
     pub(super) fn check(&self) -> Result<(), CliError> {
         let outputs = [("--out", ".html", &self.out), ("--csv", ".csv", &self.csv)];
         let inputs = [
@@ -135,7 +132,7 @@ impl InspectArguments {
         view_from(self.view.as_ref()).map(drop)
     }
 
-    /// How it is inspected.
+    /// Parameters of the inspection.
     pub(super) fn params(&self) -> InspectionParams {
         InspectionParams {
             drawing: DrawingParams {
@@ -157,7 +154,7 @@ impl InspectArguments {
         }
     }
 
-    /// Where the report goes; JSON goes to stdout.
+    /// Files of the report; JSON goes to stdout.
     pub(super) fn files(&self) -> ReportFiles {
         ReportFiles {
             html: self.out.clone(),
@@ -167,7 +164,7 @@ impl InspectArguments {
         }
     }
 
-    /// Reads what was measured.
+    /// Reads the measured features and their companions.
     pub(super) fn source(&self) -> Result<InspectionSource, CliError> {
         let _reading = WorkProgress::stage("read");
         let named = [

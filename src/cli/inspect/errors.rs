@@ -1,4 +1,4 @@
-//! What an inspection refuses, with the exit code of its kind.
+//! Errors of an inspection, with the exit code of each kind.
 
 use crate::cli::CliError;
 use crate::inspection::InspectionError;

@@ -1,4 +1,4 @@
-//! `touchup inspect`: measured features against a drawing, and a report that says pass, fail or
+//! `touchup inspect`: measured features against a drawing, and a report with pass, fail or
 //! undecided.
 
 mod arguments;
@@ -12,7 +12,7 @@ use super::progress::WorkProgress;
 use super::{CliError, Losses, print_report};
 use crate::inspection::{Inspected, InspectionSource, PartDrawing, PartPicture, inspected};
 
-/// The command: inspects, and prints the result.
+/// Runs `touchup inspect`: inspects, and prints the result.
 pub(super) fn inspect(arguments: &InspectArguments) -> Result<Losses, CliError> {
     arguments.check()?;
     let (source, params) = (arguments.source()?, arguments.params());
@@ -40,7 +40,7 @@ pub(super) fn inspect(arguments: &InspectArguments) -> Result<Losses, CliError> 
     Ok(summary::losses(&inspected.record))
 }
 
-/// Writes the files that were asked for.
+/// Writes the requested files.
 fn write(
     arguments: &InspectArguments,
     source: &InspectionSource,

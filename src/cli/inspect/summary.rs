@@ -1,11 +1,11 @@
-//! An inspection in a few lines.
+//! Inspection in a few lines.
 
 use crate::cli::{Losses, counted};
 use crate::conformity::Decision;
 use crate::inspection::{first_few, percent};
 use crate::io::inspection_file::{AlignmentRecord, CharacteristicRecord, InspectionRecord};
 
-/// The table that is printed.
+/// Table for stdout.
 pub(super) fn in_words(record: &InspectionRecord) -> String {
     let width = record
         .characteristics
@@ -51,7 +51,7 @@ pub(super) fn in_words(record: &InspectionRecord) -> String {
     lines.join("\n")
 }
 
-/// How drawing and part were brought into one frame.
+/// Alignment of drawing and part.
 fn aligned(found: &AlignmentRecord) -> String {
     let [turn, shift] = [found.rotation_vector_deg, found.translation_mm]
         .map(|v| v.iter().map(|x| x * x).sum::<f64>().sqrt());
@@ -100,7 +100,7 @@ fn row(one: &CharacteristicRecord, width: usize) -> String {
     )
 }
 
-/// What was not proved to conform, in one line; empty: all was.
+/// Characteristics without proof of conformity, a line for each decision; empty: none.
 pub(super) fn losses(record: &InspectionRecord) -> Losses {
     let named = |decision: Decision, said: &str| {
         let names: Vec<_> = record

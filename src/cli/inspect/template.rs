@@ -1,4 +1,4 @@
-//! `--write-nominal`: nominal values to be edited.
+//! `--write-nominal`: nominal values for editing.
 
 use std::path::Path;
 
@@ -7,7 +7,7 @@ use crate::inspection::{DrawingParams, template};
 use crate::io::features_file::FeatureFile;
 use crate::io::nominal_file::{NominalFileError, is_nominal_file, write_nominal};
 
-/// Writes those of a CAD mesh, or else what was measured.
+/// Writes nominal values of a CAD mesh, or else of the measured features.
 pub(super) fn write(
     path: &Path,
     nominal: Option<&Path>,

@@ -1,6 +1,6 @@
-//! The files that grow while an arm probes: the touches, and all that it measured.
+//! Files that grow while an arm probes: touches and samples.
 //!
-//! Of a touch that is written all samples are written, whatever ends the program.
+//! A written touch always has all its samples written, however the program ends.
 
 use std::path::Path;
 
@@ -11,7 +11,7 @@ use crate::probing::arm::ArmState;
 use crate::probing::execute::ProbedTouch;
 use crate::stylus::Message;
 
-/// The touches, a line each.
+/// File of the touches, a line each.
 pub(super) const TOUCHES: &str = "probed_touches.jsonl";
 /// Folder of the poses and wrenches.
 pub(super) const RECORDING: &str = "recording";
@@ -19,13 +19,12 @@ pub(super) const RECORDING: &str = "recording";
 const BASE_FRAME: &str = "base";
 /// Frame of the wrenches: the probe's own.
 const PROBE_FRAME: &str = "probe";
-/// Between two touches samples wait no longer than this before they are written, ns of the arm's
-/// clock.
+/// Maximum age of unwritten samples between two touches, ns of the arm's clock.
 const FLUSH_EVERY_NS: i64 = 1_000_000_000;
-/// An arm whose clock began anew goes on so long after its last sample, ns.
+/// Pause after the last sample of an arm with a restarted clock, ns.
 const PAUSE_NS: i64 = 1_000_000_000;
 
-/// Those of the recording.
+/// Topics of the recording.
 pub(super) fn probe_topics() -> Topics {
     Topics {
         pose: "/probe/pose".to_owned(),
@@ -34,15 +33,15 @@ pub(super) fn probe_topics() -> Topics {
     }
 }
 
-/// The open files.
+/// Open files of a probing.
 pub(super) struct ProbeFiles {
     touches: TouchLog,
     recording: SegmentedWriter,
-    /// from the arm's clock to that of the recording, ns; `None` before the first state
+    /// Offset from the arm's clock to the recording's, ns; `None` before the first state.
     offset_ns: Option<i64>,
-    /// stamp of the last sample, ns
+    /// Stamp of the last sample, ns.
     last_ns: Option<i64>,
-    /// the samples up to this stamp are with the system, ns
+    /// Stamp of the last flushed sample, ns.
     flushed_ns: i64,
 }
 
@@ -64,9 +63,9 @@ impl ProbeFiles {
         })
     }
 
-    /// Goes on with those of a folder.
+    /// Continues the files of a folder.
     ///
-    /// - `each`: receives the samples that are there.
+    /// - `each`: receives the existing samples.
     pub fn resume(
         out: &Path,
         ball_radius: f64,
@@ -94,9 +93,9 @@ impl ProbeFiles {
         })
     }
 
-    /// Writes a state as the messages of a probe: the pose in the base of the arm, as the scene
-    /// says where the part is, and the wrench in the axes of the probe, as its sensor would have
-    /// it. `None` for one that is not later than the last.
+    /// Writes a state as messages of a probe: the tip's pose in the base of the arm, as the scene
+    /// has the part's pose, and the wrench in the axes of the probe, as from its sensor. `None` for
+    /// a state not later than the last.
     pub fn record(&mut self, state: &ArmState) -> Result<Option<[Message; 2]>, CliError> {
         let last_ns = self.last_ns;
         let offset_ns = *self.offset_ns.get_or_insert(match last_ns {
@@ -123,7 +122,7 @@ impl ProbeFiles {
         Ok(Some([pose, wrench]))
     }
 
-    /// Writes a touch, after all samples of it.
+    /// Writes a touch, after all its samples.
     pub fn touched(&mut self, flag: u32, touch: &ProbedTouch) -> Result<(), CliError> {
         self.recording.sync().map_err(CliError::not_written)?;
         let written = self
@@ -132,7 +131,7 @@ impl ProbeFiles {
         written.map_err(not_written(self.touches.path()))
     }
 
-    /// Ends the recording; returns how many touches were written.
+    /// Ends the recording; returns the number of written touches.
     pub fn finish(self) -> Result<usize, CliError> {
         self.recording.finish().map_err(CliError::not_written)?;
         Ok(self.touches.count())

@@ -1,4 +1,4 @@
-//! The folder of a probing: what was asked for, and which features are finished.
+//! Folder of a probing: its request, and its finished features.
 
 use std::path::{Path, PathBuf};
 
@@ -17,7 +17,7 @@ use crate::probing::execute::Flag;
 const REQUEST: &str = "probing.json";
 const RECORDS: &str = "probed.json";
 
-/// What a probing was asked for: `probing.json`. Another one is no continuation of it.
+/// Request of a probing, `probing.json`; only an equal request continues it.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct ProbingRequest {
     scene: PathBuf,
@@ -38,21 +38,21 @@ struct FlagRecord {
     search_radius_mm: f64,
 }
 
-/// What the command line can change of the scene.
+/// Settings of the scene that the command line can change.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
 struct ProbingSettings {
-    /// standard uncertainty that is wanted
+    /// Target standard uncertainty.
     sigma_mm: f64,
     most_touches: usize,
     largest_force_n: f64,
     longest_s: f64,
     slides: bool,
-    /// of a check of the arm, or as the scene tells
+    /// From a check of the arm, or from the scene.
     #[serde(default)]
     touch_sigma_mm: f64,
     #[serde(default)]
     growth_mm_per_m: f64,
-    /// characteristics that are to be decided, in words
+    /// Characteristics to decide, in words.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     until_decided: Vec<String>,
 }
@@ -102,7 +102,7 @@ impl ProbingRequest {
         })
     }
 
-    /// What differs from the request before; `None`: nothing that matters.
+    /// Difference from the request before; `None`: none of importance.
     fn difference(&self, before: &Self) -> Option<&'static str> {
         let differences = [
             (self.is_simulated != before.is_simulated, "--robot"),
@@ -133,20 +133,20 @@ fn not_read(path: &Path) -> impl FnOnce(std::io::Error) -> CliError {
     }
 }
 
-/// The folder that `--out` names.
+/// Folder of `--out`.
 #[derive(Clone, Copy)]
 pub(super) struct ProbingFolder<'a> {
     pub path: &'a Path,
 }
 
 impl ProbingFolder<'_> {
-    /// Begins a probing in the place of an older one.
+    /// Begins a probing in place of an older one.
     pub fn begin(self, request: &ProbingRequest) -> Result<(), CliError> {
         write_json(&self.path.join(REQUEST), request)?;
         self.write(&ProbedFile::default())
     }
 
-    /// Refuses to write over a recording that no probing made, as that of a session.
+    /// Refuses to overwrite a recording of another origin, as a session's.
     pub fn check_own(self) -> Result<(), CliError> {
         let recording = self.path.join(RECORDING);
         let is_own = self.path.join(REQUEST).exists() || !recording.exists();
@@ -159,7 +159,7 @@ impl ProbingFolder<'_> {
         )
     }
 
-    /// Refuses to write over touches of a probing that was broken off.
+    /// Refuses to overwrite touches of an interrupted probing.
     pub fn check_free(self) -> Result<(), CliError> {
         let Some(request) = self.read::<ProbingRequest>(REQUEST)? else {
             return Ok(());
@@ -184,7 +184,7 @@ impl ProbingFolder<'_> {
         require(is_done || self.touches()?.is_empty(), why)
     }
 
-    /// The features that are finished, where the probing of the folder is that which is asked for.
+    /// Finished features, if the folder's probing has the same request.
     pub fn resume(self, request: &ProbingRequest) -> Result<Vec<ProbedRecord>, CliError> {
         let out = self.path.display();
         let none = || {
@@ -205,7 +205,7 @@ impl ProbingFolder<'_> {
         Ok(records)
     }
 
-    /// Writes the features that were probed so far.
+    /// Writes the probed features.
     pub fn write(self, records: &ProbedFile) -> Result<(), CliError> {
         write_json(&self.path.join(RECORDS), records)
     }
@@ -223,7 +223,7 @@ impl ProbingFolder<'_> {
             .features)
     }
 
-    /// A file; `None` where it is not there.
+    /// Content of a file; `None` if missing.
     fn read<T: DeserializeOwned>(self, name: &str) -> Result<Option<T>, CliError> {
         let path = self.path.join(name);
         let text = read_text(&path).map_err(not_read(&path))?;

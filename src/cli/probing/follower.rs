@@ -1,5 +1,5 @@
-//! What follows the states of an arm beside its loop: on a thread of its own while the arm moves,
-//! so that neither a disk nor the reconstruction ever holds up an order.
+//! Consumer of arm states beside the arm's loop: on its own thread during motion, so that neither a
+//! disk nor the reconstruction ever delays a command.
 
 use std::cell::OnceCell;
 use std::io;
@@ -10,22 +10,22 @@ use std::thread::Builder;
 
 use crate::probing::arm::ArmState;
 
-/// States that may wait: 16 s of an arm at 500 Hz.
+/// Capacity of the state queue: 16 s of an arm at 500 Hz.
 pub(super) const QUEUE: usize = 8192;
 
-/// Takes each state of an arm, in their order.
+/// Consumer of each state of an arm, in order.
 pub(super) trait TakeStates: Send + 'static {
-    /// Returns whether it goes on; `false`: it has failed, and the arm has to stop.
+    /// Whether the consumer continues; `false`: it has failed, and the arm has to stop.
     fn take_state(&mut self, state: &ArmState) -> bool;
 }
 
-/// Passes states to a [`TakeStates`] and returns before they are taken; who asks for it waits until
-/// all of them are.
+/// Asynchronous queue of states to a [`TakeStates`]; access to the consumer waits until the queue
+/// is empty.
 pub(super) struct Follower<F> {
-    /// while it is not with the thread
+    /// Consumer, unless the thread has it.
     here: OnceCell<Box<F>>,
     events: SyncSender<Event<F>>,
-    /// where the queue is full it waits, rather than failing: for an arm whose time waits for it
+    /// Waits instead of failing if the queue is full: for an arm with a waiting clock.
     is_patient: bool,
     has_failed: Arc<AtomicBool>,
     is_behind: bool,
@@ -42,10 +42,10 @@ enum Event<F> {
 }
 
 impl<F: TakeStates> Follower<F> {
-    /// - `is_patient`: whether [`Self::on_state`] waits where the queue is full.
+    /// - `is_patient`: whether [`Self::on_state`] waits if the queue is full.
     ///
     /// # Errors
-    /// Where the system has no thread for it.
+    /// If the system has no thread for it.
     pub fn new(follows: F, is_patient: bool) -> io::Result<Self> {
         let (events, received) = sync_channel(QUEUE);
         let has_failed = Arc::new(AtomicBool::new(false));
@@ -62,7 +62,7 @@ impl<F: TakeStates> Follower<F> {
         })
     }
 
-    /// Passes a state on.
+    /// Queues a state.
     pub fn on_state(&mut self, state: &ArmState) {
         if let Some(follows) = self.here.take() {
             // the queue is empty then
@@ -76,18 +76,17 @@ impl<F: TakeStates> Follower<F> {
         }
     }
 
-    /// Whether the arm has to stop: it has failed, or a state found the queue full and was not
-    /// taken.
+    /// Whether the arm has to stop: the consumer has failed, or a full queue lost a state.
     pub fn has_failed(&self) -> bool {
         self.is_behind || self.has_failed.load(Ordering::Acquire)
     }
 
-    /// Whether a state was not taken.
+    /// Whether a full queue lost a state.
     pub fn is_behind(&self) -> bool {
         self.is_behind
     }
 
-    /// With all states taken; waits for that. To be called while the arm stands.
+    /// Consumer after all queued states; waits for them. For calls while the arm stands.
     pub fn get(&self) -> &F {
         self.here.get_or_init(|| self.returned())
     }
@@ -112,7 +111,7 @@ impl<F: TakeStates> Follower<F> {
     }
 }
 
-/// Until nobody sends any more.
+/// Consumes events until all senders are gone.
 fn follow<F: TakeStates>(events: &Receiver<Event<F>>, has_failed: &AtomicBool) {
     let mut with = None;
     for event in events {
@@ -126,7 +125,7 @@ fn follow<F: TakeStates>(events: &Receiver<Event<F>>, has_failed: &AtomicBool) {
             (Event::State(_), None) => {}
             (Event::Return(to), _) => {
                 if let Some(follows) = with.take() {
-                    // who asked waits for it
+                    // the requester waits for it
                     let _ = to.send(follows);
                 }
             }
@@ -144,7 +143,7 @@ mod tests {
     use crate::probing::arm::Safety;
     use crate::stylus::Wrench;
 
-    /// Takes a state for each permit that it has.
+    /// Consumer that takes a state per permit.
     struct Permitted {
         permits: Receiver<bool>,
         taken: Vec<i64>,
@@ -185,7 +184,7 @@ mod tests {
         )
         .unwrap();
         for round in 0..3 {
-            // a disk that hangs holds up nobody
+            // a hanging disk delays nobody
             (0..100).for_each(|at| follower.on_state(&state(round * 100 + at)));
             (0..100).for_each(|_| permit.send(true).unwrap());
             assert_eq!(follower.get().taken.len() as i64, (round + 1) * 100);
@@ -207,7 +206,7 @@ mod tests {
             false,
         )
         .unwrap();
-        // one is with the thread, so many wait, perhaps with the event that began it
+        // the thread holds one state, the queue its capacity, perhaps with the first event
         let mut sent = 0;
         while !follower.has_failed() {
             follower.on_state(&state(sent));
@@ -218,7 +217,7 @@ mod tests {
             "{sent}"
         );
         (0..sent).for_each(|_| permit.send(true).unwrap());
-        // all but the last, which found no room
+        // all but the last, lost to the full queue
         assert_eq!(
             follower.into_inner().taken,
             (0..sent - 1).collect::<Vec<_>>()

@@ -1,4 +1,4 @@
-//! What of a drawing the flags are probed for, where a decision is the goal.
+//! Decision goals of the flags, from a drawing.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -16,12 +16,11 @@ use crate::io::nominal_file::{NominalRecord, NominalTolerance, read_nominal};
 use crate::probing::execute::{Flag, StaticWorld, World};
 use crate::probing::plan::{DecisionGoal, SoughtCharacteristic};
 
-/// The surface at a flag is looked for within this, m.
+/// Search radius for the surface at a flag, m.
 const NEAR: f64 = 20e-3;
 
-/// Reads a file of nominal values, and finds the characteristics of each flag: of its kind, with
-/// their centre no farther from it across the normal of the scan there than its radius; or by its
-/// number.
+/// Reads nominal values and finds the characteristics of each flag: by its number, or by its kind,
+/// with the centre within the flag's radius across the scan's normal there.
 ///
 /// - `world`: the scan.
 pub(in crate::cli) fn goals_of(
@@ -110,7 +109,7 @@ fn is_of(record: &NominalRecord, flag: &Flag, world: &StaticWorld) -> bool {
     match_features(&[sought], &[place], flag.radius) == [FeatureMatch::Found(flag.id)]
 }
 
-/// In m.
+/// Characteristics of a group, in m.
 fn sought(group: &[&NominalRecord]) -> Result<Vec<SoughtCharacteristic>, String> {
     let is_decided = |record: &&&NominalRecord| {
         record

@@ -1,5 +1,5 @@
-//! What `touchup probe` and `touchup demo --robot sim` share: features are probed while the mesh
-//! follows, and all results are written.
+//! Common part of `touchup probe` and `touchup demo --robot sim`: probes features while the mesh
+//! follows, and writes all results.
 
 mod files;
 mod folder;
@@ -38,26 +38,26 @@ use report::{CheckOfResults, ProbedFile, ProbedRecord};
 use world::LiveWorld;
 pub(super) use world::{KeptMeasurements, SpotWorld};
 
-/// The features to probe, the cell, and the output files.
+/// Features to probe, cell, and output files.
 pub(super) struct Probing<'a> {
-    /// with `robot`
+    /// Scene with `robot`.
     pub scene: &'a Path,
     pub scan: &'a Path,
     pub unit: MeshUnit,
     pub flags: &'a [Flag],
-    /// the simulated arm waits for viewers; a real one does not
+    /// Whether the arm is simulated and waits for viewers, unlike a real one.
     pub is_simulated: bool,
-    /// the mesh is written also where something of the input is surely wrong
+    /// Whether to write the mesh even if some input is surely wrong.
     pub is_forced: bool,
     pub out: &'a Path,
 }
 
-/// Its results.
+/// Results of a probing.
 pub(super) struct Done {
     pub summary: ProbingSummary,
-    /// those that were probed now
+    /// Features probed in this run.
     pub probed: Vec<Probed>,
-    /// what is not as it was asked for, or what ended it
+    /// Unmet requests, or the reason of the end.
     pub outcome: Result<Losses, CliError>,
 }
 
@@ -71,7 +71,7 @@ impl Probing<'_> {
 
     /// Plans all touches and draws the plan; nothing moves.
     ///
-    /// - `now`: of the arm.
+    /// - `now`: state of the arm.
     pub fn planned(&self, ready: &Ready, now: &ArmState) -> Result<Vec<Plan>, CliError> {
         let _planning = WorkProgress::stage("plan");
         let world = ready.static_world()?;
@@ -88,16 +88,15 @@ impl Probing<'_> {
         Ok(plans)
     }
 
-    /// Refuses to write over a probing that was broken off.
+    /// Refuses to overwrite an interrupted probing.
     pub fn check_free(&self) -> Result<(), CliError> {
         ProbingFolder { path: self.out }.check_free()
     }
 
-    /// Probes all flags, in their order; each touch and each feature is written as soon as it is
-    /// there. A stop of the arm ends it, and a signal. Where what was measured is surely wrong no
-    /// mesh is written, unless that is forced.
+    /// Probes all flags in order; writes each touch and each feature at once. A stop of the arm or
+    /// a signal ends it. Surely wrong measurements prevent a mesh, unless forced.
     ///
-    /// - `is_resumed`: what is finished in the folder is not probed again.
+    /// - `is_resumed`: skips the finished features of the folder.
     #[expect(clippy::too_many_lines)]
     pub fn done(
         &self,
@@ -134,7 +133,7 @@ impl Probing<'_> {
             references = prober.take_references();
             features.push(ProbedRecord::of(&one, flag));
             features.sort_by_key(|record| record.flag);
-            // kept as it is, whatever comes after it
+            // on disk at once, whatever comes after it
             let file = ProbedFile {
                 features,
                 check: Some(check.clone()),
@@ -245,10 +244,10 @@ impl Probing<'_> {
             touches_out: Some(&touches_out),
         };
         let options = RefinementOptions {
-            // an arm that met no surface has measured nothing that could be wrong: each feature
-            // says why
+            // an arm without any contact has no measurement that could be wrong: each feature says
+            // why
             force: self.is_forced || touches.iter().all(|touch| touch.centre_mm.is_none()),
-            // all but a plane is probed where the scan may lack it
+            // the scan may lack any probed feature but a plane
             touches_flaws: self.flags.iter().any(|flag| flag.kind != Some(Kind::Plane)),
             ..RefinementOptions::default()
         };
@@ -256,7 +255,7 @@ impl Probing<'_> {
     }
 }
 
-/// Numbers that were written A,B,C in mm, m; `None` where one is no number.
+/// Numbers in m from the text A,B,C in mm; `None` if one is no number.
 pub(super) fn metres(text: &str) -> Option<Vec<f64>> {
     text.split(',')
         .map(|mm| {
@@ -268,7 +267,7 @@ pub(super) fn metres(text: &str) -> Option<Vec<f64>> {
         .collect()
 }
 
-/// A place that was written X,Y,Z in mm, m.
+/// Place in m from the text X,Y,Z in mm.
 pub(super) fn millimetres(flag: &str, text: &str) -> Result<Vector3<f64>, CliError> {
     let place: Option<[f64; 3]> = metres(text).and_then(|place| place.try_into().ok());
     place
@@ -276,9 +275,9 @@ pub(super) fn millimetres(flag: &str, text: &str) -> Result<Vector3<f64>, CliErr
         .ok_or_else(|| CliError::usage(format!("{flag} {text} is not X,Y,Z in mm")))
 }
 
-/// A flag of a command line.
+/// Flag from the command line.
 ///
-/// - `radius`: m, where it names none.
+/// - `radius`: default radius, m.
 pub(super) fn flag_of(id: u32, text: &str, radius: f64) -> Result<Flag, CliError> {
     const FORM: &str = "KIND@X,Y,Z or KIND@X,Y,Z,RADIUS in mm, with KIND hole, slot, pocket, boss, edge, plane or unknown";
     let wrong = || CliError::usage(format!("--feature {text} is not {FORM}"));

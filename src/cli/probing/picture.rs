@@ -1,4 +1,4 @@
-//! Pictures of the path that an arm would follow, and of the touches that it made.
+//! Pictures of an arm's planned path, and of its touches.
 
 use std::path::Path;
 
@@ -19,10 +19,10 @@ const HELD_BACK: Rgb = [213, 94, 0];
 const TOUCHED: Rgb = [0, 114, 178];
 const MISS: Rgb = [213, 94, 0];
 const REFUSED: Rgb = [240, 200, 30];
-/// Lines and places, over the diagonal of the part.
+/// Line width and size of places, relative to the diagonal of the part.
 const LINE: f64 = 0.0012;
 const PLACE: f64 = 0.005;
-/// A flag is a pin of this height, over the same.
+/// Height of a flag's pin, relative to the diagonal of the part.
 const PIN: f64 = 0.13;
 /// Direction of view.
 const FROM: [f64; 3] = [-0.45, -0.75, 1.0];
@@ -63,7 +63,7 @@ fn flagged(drawing: &mut DrawnMesh, flags: &[Flag], size: f64) {
     }
 }
 
-/// The scan with the planned path of the arm.
+/// Draws the scan with the planned path of the arm.
 pub(super) fn draw_plan(
     scan: &TriMesh,
     plans: &[Plan],
@@ -106,9 +106,9 @@ pub(super) fn draw_plan(
     )
 }
 
-/// The refined mesh with the touches.
+/// Draws the refined mesh with the touches.
 ///
-/// - `probed`: their slides.
+/// - `probed`: features with their slides.
 pub(super) fn draw_touches(
     mesh: &TriMesh,
     touches: &[TouchLine],

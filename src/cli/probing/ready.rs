@@ -1,4 +1,4 @@
-//! Scene and scan of an arm, read and checked before anything moves.
+//! Scene and scan of an arm, read and checked before motion.
 
 use std::path::Path;
 use std::time::SystemTime;
@@ -17,7 +17,7 @@ use crate::scan::{Scan, read_scan};
 use crate::scene::{CheckStanding, Scene, simulated_arm};
 use crate::sim::ArmParams;
 
-/// How far the check of the arm can be relied on now; `None` without `robot`.
+/// Current validity of the arm's check; `None` without `robot`.
 fn standing(scene: &Scene) -> Option<CheckStanding> {
     scene
         .robot
@@ -25,7 +25,7 @@ fn standing(scene: &Scene) -> Option<CheckStanding> {
         .map(|robot| robot.check_standing(SystemTime::now()))
 }
 
-/// Refuses a value of `--temperature-c` that no cell has.
+/// Refuses an impossible cell temperature in `--temperature-c`.
 pub(in crate::cli) fn check_temperature(temperature_c: f64) -> Result<(), CliError> {
     let is_allowed = (-50.0..=100.0).contains(&temperature_c);
     require(
@@ -34,17 +34,17 @@ pub(in crate::cli) fn check_temperature(temperature_c: f64) -> Result<(), CliErr
     )
 }
 
-/// A prepared probing.
+/// Prepared probing.
 pub(in crate::cli) struct Ready {
     pub cell: Cell,
     pub params: ProbeParams,
     pub scene: Scene,
-    /// what it tells of tip and scan
+    /// Settings of tip and scan, with their sources.
     pub told: ToldNumbers,
     pub(super) mesh: TriMesh,
-    /// beside the part
+    /// Spheres beside the part.
     pub spheres: Vec<ReferenceSphere>,
-    /// how far the check of the arm can be relied on now
+    /// Current validity of the arm's check.
     pub check: CheckStanding,
 }
 
@@ -54,7 +54,7 @@ const NO_ROBOT: &str = "the scene names no `robot`, so the pose of the arm's bas
 const NO_MOTION: &str = "the scene does not allow the arm to move: look at plan.png first, then put `allow_motion: true` under `robot`";
 
 impl Ready {
-    /// Reads scene and scan; the scene tells the radius of the ball.
+    /// Reads scene and scan; the scene has the tip radius.
     pub fn read(scene: &Path, scan: &Path, unit: MeshUnit) -> Result<Self, CliError> {
         let (scene, told) = ToldFlags::default().scene(Some(scene))?;
         let (cell, params) = scene.probing().ok_or_else(|| CliError::usage(NO_ROBOT))?;
@@ -80,10 +80,10 @@ impl Ready {
         }
     }
 
-    /// The cell has this temperature, °C.
+    /// Sets the temperature of the cell, °C.
     ///
     /// # Errors
-    /// [`CliError::usage`] for none that a cell can have.
+    /// [`CliError::usage`] for an impossible temperature.
     pub fn at_temperature(&mut self, temperature_c: f64) -> Result<(), CliError> {
         check_temperature(temperature_c)?;
         self.scene
@@ -94,7 +94,7 @@ impl Ready {
         Ok(())
     }
 
-    /// A simulated arm of this cell.
+    /// Simulated arm of this cell.
     pub fn simulated_arm(&self, seed: u64, errors: ArmErrorsName) -> ArmParams {
         let errors = errors.drawn(self.params.pattern.shared.registered_at.into(), seed);
         ArmParams {
@@ -104,16 +104,14 @@ impl Ready {
         }
     }
 
-    /// A mesh of the part, and the spheres beside it.
+    /// Mesh of the part, and the spheres beside it.
     pub fn with_spheres(&self, part: &TriMesh) -> Result<TriMesh, CliError> {
         Ok(beside_spheres(part, &self.spheres)?)
     }
 
-    /// Where a plan without an arm begins: the pose of the tip in B, and the centre of the ball in
-    /// O.
+    /// Start of a plan without an arm: pose of the tip in B, and centre of the ball in O.
     ///
-    /// - `place`: of the ball in O, m; `None`: above the scan, as a simulated arm begins above its
-    ///   part.
+    /// - `place`: ball centre in O, m; `None`: above the scan, like a simulated arm above its part.
     pub fn start(&self, place: Option<Point3<f64>>) -> (Isometry3<f64>, Point3<f64>) {
         let above = self.cell.above(&self.mesh);
         match place {
@@ -122,7 +120,7 @@ impl Ready {
         }
     }
 
-    /// The scan and the spheres beside it, unchanged during probing.
+    /// Scan and spheres beside it, unchanged during probing.
     pub fn static_world(&self) -> Result<StaticWorld, CliError> {
         Ok(StaticWorld::new(self.with_spheres(&self.mesh)?))
     }
@@ -143,7 +141,7 @@ impl Ready {
             .is_some_and(|robot| robot.allow_motion)
     }
 
-    /// Refuses to move where the scene does not allow it.
+    /// Refuses to move unless the scene allows it.
     ///
     /// # Errors
     /// [`CliError::usage`]

@@ -17,48 +17,48 @@ use crate::probing::plan::DecidedCharacteristic;
 use crate::scene::{CheckRecord, CheckStanding};
 
 reported! {
-    /// One flag: of `probed.json`.
+    /// Results of one flag, in `probed.json`.
     #[derive(Clone, Deserialize)]
     pub(in crate::cli) struct ProbedRecord, pub(super) fn of(probed: &Probed, flagged: &Flag) {
         pub(super) flag: u32 = probed.flag,
         kind: String = kind_of(flagged).to_owned(),
         flagged_mm: [f64; 3] = (flagged.place * 1e3).coords.into(),
         search_radius_mm: f64 = flagged.radius * 1e3,
-        /// how it ended: `tolerance_reached`, `touches_spent`, `calibration_limits`, `decided`,
-        /// `undecided`, `undecidable`, `time_spent`, `nothing_found`, `cancelled`, `out_of_limits`,
-        /// `no_clear_path`, `stopped`
+        /// Code of the ending: `tolerance_reached`, `touches_spent`, `calibration_limits`,
+        /// `decided`, `undecided`, `undecidable`, `time_spent`, `nothing_found`, `cancelled`,
+        /// `out_of_limits`, `no_clear_path`, `stopped`.
         code: String = code(&probed.ending).to_owned(),
-        /// the same in words
+        /// Ending in words.
         ending: String = probed.ending.to_string(),
         touches: usize = probed.touches.len(),
-        /// the touches that do not count, and why
+        /// Rejected touches, with reasons.
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
         rejected_touches: Vec<RejectedTouch> = probed.touches.iter().enumerate().filter_map(RejectedTouch::of).collect(),
-        /// places of the surface that were not touched, for the scan has no part there
+        /// Omitted places: the scan has no part there.
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
         beside_the_part_mm: Vec<[f64; 3]> = probed.left_out.iter().map(|place| (place * 1e3).coords.into()).collect(),
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
         slides: Vec<SlideRecordOfFile> = probed.slides.iter().map(SlideRecordOfFile::of).collect(),
-        /// contacts that were touched again last, none of which had moved
+        /// Contacts last touched again, none of them moved.
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
         touched_again: Vec<TouchedAgain> = probed.references.iter().map(TouchedAgain::of).collect(),
-        /// so many of the touches were made before that; those after it are in doubt
+        /// Number of touches made before `touched_again`; later ones are in doubt.
         #[serde(default)]
         verified_touches: usize = probed.verified,
         duration_s: f64 = probed.seconds,
         largest_force_n: f64 = probed.peak_force,
-        /// of the wanted number, mm or rad
+        /// Uncertainty of the target number, mm or rad.
         uncertainty_mm?: f64 = probed.found.as_ref().and_then(|found| found.uncertainty).map(|sigma| sigma * 1e3),
-        /// the part of it that all touches have in common: radius, place of the part, kinematics
+        /// Share of it common to all touches: radius, place of the part, kinematics.
         shared_uncertainty_mm?: f64 = probed.found.as_ref().filter(|found| found.uncertainty.is_some()).map(|found| found.shared * 1e3),
-        /// `std` of `feature` by the scatter of its touches alone
+        /// `std` of `feature` from the scatter of its touches alone.
         #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
         std_of_touches: BTreeMap<String, f64> = probed
             .found
             .as_ref()
             .and_then(|found| found.by_touches.as_ref())
             .map_or_else(BTreeMap::new, |feature| FeatureRecord::of(feature).std),
-        /// of `--until decided`
+        /// Characteristics of `--until decided`.
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
         characteristics: Vec<ProbedCharacteristic> = probed
             .found
@@ -74,19 +74,19 @@ reported! {
 const COVERAGE: f64 = 2.0;
 
 reported! {
-    /// A characteristic that was to be decided.
+    /// Characteristic to decide.
     #[derive(Clone, Deserialize)]
     struct ProbedCharacteristic, fn of(one: &DecidedCharacteristic) {
         name: String = one.sought.name.clone(),
         quantity: String = one.sought.quantity.name().to_owned(),
-        /// `pass`, `fail` or `undecided`
+        /// `pass`, `fail` or `undecided`.
         decision: String = one.assessment.decision.name().to_owned(),
-        /// why it is undecided
+        /// Reason, if undecided.
         reason?: String = why_open(one),
         value_mm?: f64 = one.measured.map(|number| number.value * 1e3),
-        /// U, with a coverage factor of 2
+        /// U, with a coverage factor of 2.
         expanded_uncertainty_mm?: f64 = one.measured.and_then(|number| number.std).map(|std| std * COVERAGE * 1e3),
-        /// the part of the standard uncertainty that all touches have in common
+        /// Part of the standard uncertainty common to all touches.
         shared_uncertainty_mm: f64 = one.shared * 1e3,
         lower_limit_mm?: f64 = one.sought.limits.lower.map(|limit| limit * 1e3),
         upper_limit_mm?: f64 = one.sought.limits.upper.map(|limit| limit * 1e3),
@@ -127,10 +127,10 @@ impl fmt::Display for ProbedCharacteristic {
     }
 }
 
-/// A touch that does not count.
+/// Rejected touch.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct RejectedTouch {
-    /// of this probing of the feature, from 0 on
+    /// Index in this probing of the feature, from 0 on.
     index: usize,
     reason: String,
 }
@@ -144,16 +144,16 @@ impl RejectedTouch {
     }
 }
 
-/// Code of an unknown region, which has no number: all its touches are made.
+/// Code of an unknown region, without a number to measure: the arm makes all its touches.
 const UNKNOWN: &str = "unknown";
 
-/// What a flag is for, by its name.
+/// Kind of a flag, by its name.
 pub(super) fn kind_of(flag: &Flag) -> &'static str {
     flag.kind.map_or(UNKNOWN, Kind::name)
 }
 
 impl ProbedRecord {
-    /// Whether the arm probed it to an end, found or not.
+    /// Whether the arm completed the probing, with or without a feature.
     pub(super) fn is_finished(&self) -> bool {
         matches!(
             self.code.as_str(),
@@ -173,7 +173,7 @@ impl ProbedRecord {
         matches!(self.code.as_str(), "cancelled" | "stopped")
     }
 
-    /// What its references say, a line of the summary each.
+    /// Results of the references, a line of the summary each.
     fn references(&self) -> String {
         let farthest = |one: &TouchedAgain| one.off_mm.abs();
         let again = self.touched_again.iter().map(farthest).reduce(f64::max);
@@ -188,7 +188,7 @@ impl ProbedRecord {
         again.into_iter().chain(doubted).collect()
     }
 
-    /// Why it is not as it was asked for, where that is so.
+    /// Deviation from the request, if any.
     pub(super) fn loss(&self) -> Option<String> {
         let failed: Vec<_> = self
             .characteristics
@@ -218,16 +218,16 @@ impl ProbedRecord {
 }
 
 reported! {
-    /// A reference that the arm touched again.
+    /// Reference touched again.
     #[derive(Clone, Deserialize)]
     struct TouchedAgain, fn of(touch: &ReferenceTouch) {
-        /// number of the feature that it belongs to
+        /// Number of its feature.
         flag: u32 = touch.flag,
-        /// which touch of that, from 0 on
+        /// Index of the touch in that feature, from 0 on.
         index: usize = touch.index,
-        /// how much farther along its search it is now
+        /// Shift along its search, positive farther along.
         off_mm: f64 = touch.off * 1e3,
-        /// standard uncertainty of that
+        /// Standard uncertainty of the shift.
         std_mm: f64 = touch.sigma * 1e3,
     }
 }
@@ -236,7 +236,7 @@ reported! {
     /// One slide.
     #[derive(Clone, Deserialize)]
     struct SlideRecordOfFile, fn of(probed: &ProbedSlide) {
-        /// its outcome, or why it was not made
+        /// Outcome, or reason for its omission.
         ending: String = match &probed.record {
             Some(record) => record.ending.to_string(),
             None => probed.refused.clone().unwrap_or_default(),
@@ -247,35 +247,35 @@ reported! {
 }
 
 reported! {
-    /// The contact force along it.
+    /// Contact force along a slide.
     #[derive(Clone, Deserialize)]
     struct SlideForces, fn of(record: &SlideRecord) {
         duration_s: f64 = (record.stamps_ns[1] - record.stamps_ns[0]) as f64 * 1e-9,
         mean_force_n: f64 = record.mean_force,
-        /// largest deviation of the mean over a tenth of a second from the set force
+        /// Largest deviation of the mean over a tenth of a second from the set force.
         worst_force_error_n: f64 = record.worst_force,
         largest_force_n: f64 = record.peak_force,
     }
 }
 
 reported! {
-    /// The check of the arm, as it stands at the time of the results.
+    /// Check of the arm, as valid at the time of the results.
     #[derive(Clone, Deserialize)]
     pub(in crate::cli) struct CheckOfResults, pub(super) fn of(standing: &CheckStanding) {
-        /// whether nothing casts doubt on it
+        /// Whether the check is free of doubts.
         is_good: bool = standing.doubts.is_empty(),
-        /// why it cannot be relied on
+        /// Reasons against relying on it.
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
         doubts: Vec<String> = standing.doubts(),
         age_days?: f64 = standing.age_days,
-        /// what was checked, without the touches
+        /// Record of the check, without the touches.
         record?: CheckRecord = standing.record.clone(),
-        /// in one line
+        /// Check in one line.
         summary: String = standing.to_string(),
     }
 }
 
-/// What `probed.json` holds.
+/// Content of `probed.json`.
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub(super) struct ProbedFile {
     pub features: Vec<ProbedRecord>,
@@ -283,14 +283,14 @@ pub(super) struct ProbedFile {
     pub check: Option<CheckOfResults>,
 }
 
-/// The summary of a probing.
+/// Summary of a probing.
 #[derive(Debug, Serialize)]
 pub(in crate::cli) struct ProbingSummary {
     pub check: CheckOfResults,
     pub features: Vec<ProbedRecord>,
-    /// what was told of tip and scan, and by what
+    /// Settings of tip and scan, and their sources.
     pub told: ToldNumbers,
-    /// of the mesh; not there where a signal ended the probing, and where the mesh was not written
+    /// Summary of the mesh; `None` after a signal, and without a mesh.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub refine: Option<RefineSummary>,
 }
@@ -369,7 +369,7 @@ impl fmt::Display for ProbingSummary {
             writeln!(f)?;
         }
         writeln!(f, "{}", self.check.summary)?;
-        // the summary of the mesh has what was told
+        // the summary of the mesh has the settings
         match &self.refine {
             Some(refine) => write!(f, "{refine}"),
             None => write!(f, "{}", self.told),
@@ -377,7 +377,7 @@ impl fmt::Display for ProbingSummary {
     }
 }
 
-/// The touches that do not count, a line for each reason.
+/// Rejected touches, a line for each reason.
 fn by_reason(rejected: &[RejectedTouch]) -> Vec<String> {
     let mut groups: Vec<(&str, Vec<usize>)> = Vec::new();
     for RejectedTouch { index, reason } in rejected {
@@ -393,7 +393,7 @@ fn by_reason(rejected: &[RejectedTouch]) -> Vec<String> {
     groups.into_iter().map(line).collect()
 }
 
-/// Growing numbers in words, with a range for each run of more than two: `0, 1, 4 to 9`.
+/// Ascending numbers in words, with a range for each run of more than two: `0, 1, 4 to 9`.
 fn in_ranges(numbers: &[usize]) -> String {
     let runs = numbers
         .chunk_by(|a, b| a + 1 == *b)
@@ -424,7 +424,7 @@ impl fmt::Display for SlideRecordOfFile {
     }
 }
 
-/// The numbers of a feature with their standard uncertainties, mm.
+/// Numbers of a feature with their standard uncertainties, mm.
 fn numbers(feature: &FeatureRecord) -> String {
     let with = |name: &str, value: Option<f64>, key: &str| {
         value.map(|value| match feature.std.get(key) {

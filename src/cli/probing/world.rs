@@ -1,5 +1,5 @@
-//! What is around an arm while it works: the mesh, which follows a probing, the files that are
-//! written, and the signals that stop it.
+//! Surroundings of a working arm: the mesh, which follows a probing, output files, and stop
+//! signals.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -25,13 +25,13 @@ use crate::threads::Threads;
 /// Room reserved for new faces.
 const ROOM: usize = 1 << 16;
 
-/// The mesh is read before each touch alone, not in between: a renewal each 200 ms, ns.
+/// Renewal period of the mesh, which the arm reads only before each touch: 200 ms, in ns.
 const EVERY_NS: i64 = 200_000_000;
 
-/// The mesh that follows the samples.
+/// Mesh that follows the samples.
 struct FollowingMesh {
     engine: Engine,
-    /// of the base in the frame of the scan
+    /// Pose of the base in the frame of the scan.
     pose_ob: Isometry3<f64>,
     pose: Option<StampedPose>,
     failed: Option<LiveError>,
@@ -45,8 +45,8 @@ impl FollowingMesh {
             .scene
             .refine_params(WrenchFrame::Sensor)
             .ok_or_else(nothing)?;
-        // what a simulated arm does next does not depend on how fast this computer is; a real one
-        // goes on in that time
+        // a simulated arm behaves independently of the computer's speed; a real one moves on
+        // meanwhile
         let pace = Pace {
             is_patient: is_simulated,
             every_ns: EVERY_NS,
@@ -73,7 +73,7 @@ impl FollowingMesh {
         })
     }
 
-    /// Takes a message; a wrench comes behind the pose of the same state.
+    /// Takes a message; a wrench comes after the pose of the same state.
     fn take(&mut self, message: &Message) {
         let wrench = match message {
             Message::Pose(pose) => return self.pose = Some(*pose),
@@ -94,7 +94,7 @@ impl FollowingMesh {
     }
 }
 
-/// The files of a probing, and the mesh: each state of the arm is a sample of both.
+/// Files and mesh of a probing: each state of the arm is a sample for both.
 struct Followed {
     mesh: FollowingMesh,
     files: ProbeFiles,
@@ -114,8 +114,8 @@ impl TakeStates for Followed {
     }
 }
 
-/// What is around an arm that probes features. Files and mesh follow its states beside the loop;
-/// between its motions it waits for them.
+/// Surroundings of an arm that probes features. Files and mesh follow its states beside the loop;
+/// between motions the arm waits for them.
 pub(super) struct LiveWorld<'a> {
     followed: Follower<Followed>,
     signals: &'a StopSignals,
@@ -123,7 +123,7 @@ pub(super) struct LiveWorld<'a> {
 }
 
 impl<'a> LiveWorld<'a> {
-    /// - `is_resumed`: goes on with the files of the folder, and with the mesh that was touched.
+    /// - `is_resumed`: continues the files of the folder and their mesh.
     pub fn new(
         ready: &Ready,
         out: &Path,
@@ -156,7 +156,7 @@ impl<'a> LiveWorld<'a> {
         })
     }
 
-    /// Ends the recording; returns how many touches were written.
+    /// Ends the recording; returns the number of written touches.
     pub fn finish(self) -> Result<usize, CliError> {
         let is_behind = self.followed.is_behind();
         let Followed {
@@ -223,28 +223,28 @@ impl World for LiveWorld<'_> {
     }
 }
 
-/// The scan as it is, while an arm measures something on it.
+/// Unrefined scan, while an arm measures on it.
 pub(in crate::cli) struct SpotWorld<'a> {
     scan: StaticWorld,
     signals: &'a StopSignals,
     log: MeasurementLog,
-    /// lines of what was measured, in their order; curves left out
+    /// Lines of the measurements, in order, without curves.
     made: Vec<String>,
-    /// m
+    /// Radius of the ball, m.
     ball_radius: f64,
     failed: Option<CliError>,
 }
 
-/// The file in which what an arm measures is kept as it is measured, if any.
+/// Kind of an arm's measurements, and the file for their immediate output, if any.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::cli) enum KeptMeasurements<'a> {
-    /// a line of JSON for each touch
+    /// A line of JSON for each touch.
     Touches(Option<&'a Path>),
-    /// a line of CSV for each static segment
+    /// A line of CSV for each static segment.
     Segments(Option<&'a Path>),
 }
 
-/// What is measured, and the file in which it is kept, if any.
+/// Open log of the measurements, if any.
 enum MeasurementLog {
     Touches(Option<TouchLog>),
     Segments(Option<StaticPoseLog>),
@@ -272,7 +272,7 @@ impl MeasurementLog {
         }
     }
 
-    /// What it keeps, and the flag that names a file for that.
+    /// Plural of the measurements, and the flag of their output file.
     fn names(&self) -> [&'static str; 2] {
         match self {
             Self::Touches(_) => ["touches", "--touches-out"],
@@ -282,7 +282,7 @@ impl MeasurementLog {
 }
 
 impl<'a> SpotWorld<'a> {
-    /// - `kept`: what is measured, and where each of it is written as it is measured.
+    /// - `kept`: kind of the measurements, and the file for their immediate output.
     pub fn new(
         ready: &Ready,
         kept: KeptMeasurements,
@@ -300,8 +300,8 @@ impl<'a> SpotWorld<'a> {
         })
     }
 
-    /// What was measured; where that was broken off what was measured until then is printed, unless
-    /// a file has it.
+    /// Returns the measurement; after an error it prints the lines until then, unless a file has
+    /// them.
     pub fn finish<T>(self, measured: Result<T, CliError>) -> Result<T, CliError> {
         let measured = self.failed.map_or(measured, Err);
         let [what, flag] = self.log.names();
@@ -351,7 +351,7 @@ impl World for SpotWorld<'_> {
         let MeasurementLog::Touches(Some(log)) = &mut self.log else {
             return;
         };
-        // no recording has another clock
+        // no recording with another clock
         if let Err(error) = log.append(flag, touch, 0) {
             self.failed = Some(not_written(log.path())(error));
         }

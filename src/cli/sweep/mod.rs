@@ -1,4 +1,4 @@
-//! `touchup sweep`: many refinements, each a job that gives the same bytes wherever it runs.
+//! `touchup sweep`: many refinements, each a job with the same bytes on any machine.
 
 mod places;
 mod plan;
@@ -15,7 +15,7 @@ use super::{CliError, Losses};
 pub(super) enum SweepArguments {
     /// Makes the jobs: settings of the scene times recordings, a line of JSON for each
     Plan(plan::PlanArguments),
-    /// Runs one job, or all that have no result yet, one after the other
+    /// Runs one job, or all without a result, one after the other
     Run(run::RunArguments),
     /// Makes a table of the results: a row for each job, and one for each feature
     Table(table::TableArguments),

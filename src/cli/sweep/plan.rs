@@ -1,4 +1,4 @@
-//! `touchup sweep plan`: from what is swept to the jobs.
+//! `touchup sweep plan`: from a grid to the jobs.
 
 use std::io::{ErrorKind, Write, stdout};
 use std::path::{Path, PathBuf};
@@ -12,15 +12,15 @@ use crate::sweep::{JobsFile, SweepPlan};
 
 #[derive(Debug, Args)]
 pub(in crate::cli) struct PlanArguments {
-    /// What is swept, YAML: scan, scene, recordings, the keys with their values, and how they are
-    /// sampled (docs/sweep.md)
+    /// Grid of the sweep, YAML: scan, scene, recordings, the keys with their values, and the
+    /// sampling (docs/sweep.md)
     #[arg(value_name = "GRID.yaml")]
     grid: PathBuf,
-    /// Recordings beside those that the file names: of any kind that `touchup refine` reads
+    /// Further recordings beside the grid's, of any kind that `touchup refine` reads
     #[arg(value_name = "RECORDING")]
     recordings: Vec<PathBuf>,
-    /// Output: the jobs, a line of JSON for each; by default they are printed. Paths in them are
-    /// relative to its folder
+    /// Output: the jobs, a line of JSON for each; default: stdout. Paths in them are relative to
+    /// its folder
     #[arg(long, value_name = "JSONL")]
     out: Option<PathBuf>,
 }
@@ -52,13 +52,12 @@ pub(in crate::cli) fn plan(arguments: &PlanArguments) -> Result<Losses, CliError
     Ok(Losses::new())
 }
 
-/// Writes the jobs of a sweep into a file, as a whole or not at all, and returns how many there
-/// are.
+/// Writes the jobs of a sweep into a file, as a whole or not at all, and returns their number.
 ///
-/// - `grid`: what is swept; `recordings`: more of them, relative to the present folder.
+/// - `grid`: file of the sweep; `recordings`: further ones, relative to the present folder.
 ///
 /// # Errors
-/// As the command line has them.
+/// As on the command line.
 pub fn plan_sweep(grid: &Path, recordings: &[PathBuf], out: &Path) -> Result<u64, CliError> {
     check_kept("GRID.yaml", grid, out)?;
     recordings
@@ -72,13 +71,13 @@ pub fn plan_sweep(grid: &Path, recordings: &[PathBuf], out: &Path) -> Result<u64
     Ok(plan.count())
 }
 
-/// Every setting is checked: of many that takes its time.
+/// Reads a plan and checks every setting, with a progress stage for many.
 fn checked(grid: &Path, recordings: &[PathBuf], folder: &Path) -> Result<SweepPlan, CliError> {
     let _checking = WorkProgress::stage("check");
     Ok(SweepPlan::read(grid, recordings, folder)?)
 }
 
-/// Stops where nobody reads any more.
+/// Writes the jobs; stops at a closed pipe.
 fn write_jobs(plan: &SweepPlan, out: &mut impl Write, path: &Path) -> Result<(), CliError> {
     let mut progress = WorkProgress::new("plan", Some(plan.count()));
     for job in plan.jobs() {

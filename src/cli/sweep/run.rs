@@ -1,4 +1,4 @@
-//! `touchup sweep run`: one job, or all that are missing.
+//! `touchup sweep run`: one job, or all without a result.
 
 use std::path::{Path, PathBuf};
 
@@ -14,16 +14,16 @@ use crate::sweep::{GivenInput, JobReport, JobRunner, JobsFile, SweepError};
 
 #[derive(Debug, Args)]
 pub(in crate::cli) struct RunArguments {
-    /// The jobs, as `touchup sweep plan` writes them
+    /// Jobs, as `touchup sweep plan` writes them
     #[arg(value_name = "JSONL")]
     jobs: PathBuf,
-    /// Runs this one alone, by its number; a job whose result is there ends at once
+    /// Runs the job of this number alone; a job with a result ends at once
     #[arg(long, value_name = "K")]
     job: Option<u64>,
-    /// Where each job has a folder by its id [default: results, beside the jobs]
+    /// Folder with a subfolder for each job, by its id [default: results, beside the jobs]
     #[arg(long, value_name = "DIR")]
     results: Option<PathBuf>,
-    /// Also runs what has a result, as one that failed; the new one takes its place
+    /// Also reruns jobs with a result, as failed ones, and replaces it
     #[arg(long)]
     again: bool,
     /// Prints one JSON object
@@ -31,7 +31,7 @@ pub(in crate::cli) struct RunArguments {
     json: bool,
 }
 
-/// Jobs that are named at most in one list.
+/// Maximum number of jobs in a message.
 pub(super) const MOST_NAMED: usize = 20;
 
 pub(in crate::cli) fn run(arguments: &RunArguments) -> Result<Losses, CliError> {
@@ -98,19 +98,19 @@ fn losses_of(summary: &Value) -> Losses {
         .collect()
 }
 
-/// What `--json` prints of all.
+/// Output of `--json` for all jobs.
 #[derive(Debug, Default, Serialize)]
 struct RunSummary {
     jobs: u64,
-    /// refined now
+    /// Refined now.
     ran: u64,
-    /// had a result before
+    /// With a result before.
     were_there: u64,
-    /// failed by their input, now or before
+    /// Failed by their input, now or before.
     failed: u64,
-    /// refined from a damaged recording
+    /// Refined from a damaged recording.
     with_losses: u64,
-    /// have a result that is no longer as it was written
+    /// With a result changed since it was written.
     damaged: u64,
 }
 
@@ -121,7 +121,7 @@ fn run_all(
     as_json: bool,
 ) -> Result<Losses, CliError> {
     let mut summary = RunSummary::default();
-    // every line is looked at before the first one is run
+    // checks every line before the first run
     let count = JobsFile::open(jobs)?.try_fold(0_u64, |count, job| job.map(|_| count + 1))?;
     let mut progress = WorkProgress::new("sweep", Some(count));
     let mut named = Losses::new();

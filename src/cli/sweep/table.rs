@@ -1,4 +1,4 @@
-//! `touchup sweep table`: what came of all jobs.
+//! `touchup sweep table`: results of all jobs.
 
 use std::path::PathBuf;
 
@@ -12,10 +12,10 @@ use crate::sweep::{SweepTables, tables_of};
 
 #[derive(Debug, Args)]
 pub(in crate::cli) struct TableArguments {
-    /// The jobs, as `touchup sweep plan` writes them
+    /// Jobs, as `touchup sweep plan` writes them
     #[arg(value_name = "JSONL")]
     jobs: PathBuf,
-    /// Where each job has a folder by its id [default: results, beside the jobs]
+    /// Folder with a subfolder for each job, by its id [default: results, beside the jobs]
     #[arg(long, value_name = "DIR")]
     results: Option<PathBuf>,
     /// Output: a row for each job with a result, .csv or .parquet

@@ -1,5 +1,4 @@
-//! `touchup whatif`: what moved from one result of a sweep to another by more than either is
-//! uncertain.
+//! `touchup whatif`: differences between two results of a sweep beyond their uncertainties.
 
 mod page;
 mod report;
@@ -20,19 +19,19 @@ use crate::sweep::{JobResult, JobsFile, WhatIf};
 
 #[derive(Debug, Args)]
 pub(super) struct WhatIfArguments {
-    /// A folder of a result (`touchup sweep run`), or with --jobs the number of a job
+    /// Folder of a result (`touchup sweep run`), or with --jobs the number of a job
     #[arg(value_name = "A")]
     a: String,
-    /// Another one, of the same scan
+    /// Folder or number of another result of the same scan
     #[arg(value_name = "B")]
     b: String,
-    /// The jobs, as `touchup sweep plan` writes them: then A and B are numbers
+    /// Jobs, as `touchup sweep plan` writes them: A and B are then their numbers
     #[arg(long, value_name = "JSONL")]
     jobs: Option<PathBuf>,
-    /// With --jobs: where each has a folder by its id [default: results, beside the jobs]
+    /// With --jobs: folder with a subfolder for each, by its id [default: results, beside the jobs]
     #[arg(long, value_name = "DIR", requires = "jobs")]
     results: Option<PathBuf>,
-    /// Output: a page with pictures of both, what moved, and both values of each feature
+    /// Output: a page with pictures of both, the differences, and both values of each feature
     #[arg(long, value_name = "HTML")]
     out: Option<PathBuf>,
     /// Output: a row for each vertex, .csv or .parquet
@@ -50,7 +49,7 @@ pub(super) struct WhatIfArguments {
     json: bool,
 }
 
-/// The command.
+/// Runs `touchup whatif`.
 pub(super) fn what_if(arguments: &WhatIfArguments) -> Result<Losses, CliError> {
     arguments.check()?;
     let names = [&arguments.a, &arguments.b];
@@ -121,7 +120,7 @@ impl WhatIfArguments {
         Ok(())
     }
 
-    /// The folders of both results.
+    /// Folders of both results.
     fn folders(&self) -> Result<[PathBuf; 2], CliError> {
         let Some(jobs) = &self.jobs else {
             return self.given_folders();

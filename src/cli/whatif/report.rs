@@ -1,4 +1,4 @@
-//! What moved, in numbers and in words.
+//! Differences of two results, in numbers and in words.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -11,24 +11,24 @@ use crate::compare::{Displacement, moved_count};
 use crate::mesh::{TriMesh, VertexId};
 use crate::sweep::{COVERAGE as K, FeatureChange, JobResult, NumberChange, WhatIf};
 
-/// What `--json` prints.
+/// Output of `--json`.
 #[derive(Debug, Serialize)]
 pub(super) struct WhatIfReport {
-    /// what is called A and B, as it was given
+    /// Names of A and B, as on the command line.
     pub a: String,
     pub b: String,
-    /// keys of the scene that differ, by path, with both values; `null`: it is not there
+    /// Differing keys of the scene, by path, with both values; `null`: missing.
     pub keys: BTreeMap<String, [Value; 2]>,
-    /// ± is so many standard deviations
+    /// Number of standard deviations in ±.
     pub k: f64,
-    /// of the mesh of A
+    /// Vertices of the mesh of A.
     pub vertices_a: MovedVertices,
-    /// of the mesh of B; not there where both have the same vertices
+    /// Vertices of the mesh of B; `None` if both have the same vertices.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub vertices_b: Option<MovedVertices>,
-    /// features of which a number moved, or that one alone has
+    /// Number of features with a moved number, or in one result alone.
     pub features_moved: usize,
-    /// all of them
+    /// All features.
     pub features: Vec<FeatureChange>,
 }
 
@@ -37,19 +37,19 @@ reported! {
     pub(super) struct MovedVertices, fn of(mesh: &TriMesh, displaced: &[Displacement]) {
         pub vertices: usize = vertices_of(mesh).count(),
         pub moved: usize = moved_count(mesh, displaced, K),
-        /// whether a standard deviation is known; if not, all that lies elsewhere counts
+        /// Whether a standard deviation is known; if not, any displacement counts.
         pub is_sigma_known: bool = displaced.iter().any(|one| one.sigma.is_some()),
-        /// the farthest of those that moved: positive outwards
+        /// Largest displacement: positive outwards.
         pub farthest_mm: Option<f64> = farthest(mesh, displaced).map(|(_, one)| one.distance * 1e3),
-        /// its ±
+        /// ± of the largest displacement.
         pub farthest_plus_minus_mm: Option<f64> = farthest(mesh, displaced).map(|(_, one)| one.plus_minus(K) * 1e3),
-        /// where it is
+        /// Position of the largest displacement.
         pub farthest_at_mm: Option<[f64; 3]> =
             farthest(mesh, displaced).map(|(at, _)| (mesh.position(at).coords * 1e3).into()),
     }
 }
 
-/// Those that are there.
+/// Existing vertices of a mesh.
 pub(super) fn vertices_of(mesh: &TriMesh) -> impl Iterator<Item = VertexId> {
     (0..mesh.vertex_slots() as u32)
         .map(VertexId)
@@ -80,7 +80,7 @@ impl WhatIfReport {
         }
     }
 
-    /// What differs, one key in a line.
+    /// Differing keys, one in a line.
     pub fn differences(&self) -> Vec<String> {
         let shown = |value: &Value| match value {
             Value::Null => "not there".to_owned(),
@@ -94,14 +94,14 @@ impl WhatIfReport {
     }
 }
 
-/// What `touchup whatif --json` prints of two results.
+/// Output of `touchup whatif --json` for two results.
 ///
-/// - `names`: what they are called.
+/// - `names`: names of the results.
 pub fn what_if_json(results: [&JobResult; 2], names: [&str; 2], found: &WhatIf) -> Value {
     serde_json::to_value(WhatIfReport::of(results, names, found)).unwrap_or_default()
 }
 
-/// Features that are named at most.
+/// Maximum number of listed features.
 const MOST_NAMED: usize = 20;
 
 impl fmt::Display for WhatIfReport {
@@ -166,7 +166,7 @@ impl MovedVertices {
     }
 }
 
-/// One feature with what moved of it.
+/// Feature with its moved numbers.
 fn in_words(feature: &FeatureChange) -> String {
     let FeatureChange {
         kind,

@@ -1,4 +1,4 @@
-//! What moved, as tables and as a mesh.
+//! Differences of two results, as tables and as a mesh.
 
 use std::path::Path;
 
@@ -14,7 +14,7 @@ use crate::io::result_table::ResultTable;
 use crate::mesh::TriMesh;
 use crate::sweep::{COVERAGE as K, JobResult, WhatIf};
 
-/// A row for each vertex.
+/// Table with a row for each vertex.
 pub(super) fn vertices_table([a, b]: [&JobResult; 2], found: &WhatIf) -> ResultTable {
     let mut table = ResultTable::default();
     let name = if found.of_b.is_some() { "a" } else { "both" };
@@ -47,7 +47,7 @@ fn add_vertices(table: &mut ResultTable, name: &str, mesh: &TriMesh, displaced: 
     }
 }
 
-/// A row for each number of each feature that both have, and one for each that one lacks.
+/// Table with a row for each number of each common feature, and one for each unmatched feature.
 pub(super) fn features_table(found: &WhatIf) -> ResultTable {
     let mut table = ResultTable::default();
     for feature in &found.features {
@@ -91,7 +91,7 @@ pub(super) fn features_table(found: &WhatIf) -> ResultTable {
     table
 }
 
-/// The mesh of B in the colours of the page, with columns.
+/// Writes the mesh of B in the colours of the page, with columns.
 pub(super) fn write_moved_mesh(path: &Path, b: &JobResult, found: &WhatIf) -> Result<(), CliError> {
     let displaced = found.of_b.as_ref().unwrap_or(&found.of_a);
     let colours: Vec<Rgb> = displaced.iter().map(colour_at).collect();
