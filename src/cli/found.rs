@@ -6,7 +6,7 @@ use nalgebra::{Point3, Vector3};
 use serde::Serialize;
 
 use super::reported;
-use crate::features::Kind;
+use crate::features::{InspectedQuantity, Kind};
 use crate::io::features_file::FeatureRecord;
 use crate::sim::{TruthFeature, TruthShape};
 
@@ -79,20 +79,18 @@ fn nearest<'a>(truth: &TruthFeature, found: &'a [FeatureRecord]) -> Option<&'a F
 
 /// Numbers of a feature on the drawing, beside the found ones.
 fn numbers(truth: &TruthFeature, record: Option<&FeatureRecord>) -> Vec<FoundNumber> {
-    let number = |name, truth: f64, value: fn(&FeatureRecord) -> Option<f64>| {
-        let std = record.and_then(|record| record.std.get(name).copied());
-        let is_lower_bound = name == "depth_mm"
-            && record.is_some_and(|record| record.depth_is_at_least == Some(true));
+    let number = |quantity: InspectedQuantity, truth: f64| {
+        let found = record.and_then(|record| record.number(quantity));
         FoundNumber {
-            name,
+            name: quantity.name(),
             truth: truth * 1e3,
-            found: record.and_then(value),
-            std,
-            is_lower_bound,
+            found: found.map(|found| found.value),
+            std: found.and_then(|found| found.std),
+            is_lower_bound: found.is_some_and(|found| found.is_at_least),
         }
     };
-    let diameter = |d| number("diameter_mm", d, |record| record.diameter_mm);
-    let depth = |d| number("depth_mm", d, |record| record.depth_mm);
+    let diameter = |d| number(InspectedQuantity::Diameter, d);
+    let depth = |d| number(InspectedQuantity::Depth, d);
     match truth.shape {
         TruthShape::Hole {
             diameter: d,
@@ -110,8 +108,8 @@ fn numbers(truth: &TruthFeature, record: Option<&FeatureRecord>) -> Vec<FoundNum
             depth: h,
             ..
         } => vec![
-            number("width_mm", width, |record| record.width_mm),
-            number("length_mm", length, |record| record.length_mm),
+            number(InspectedQuantity::Width, width),
+            number(InspectedQuantity::Length, length),
             depth(h),
         ],
         TruthShape::Boss {

@@ -9,8 +9,8 @@ use super::InspectionError;
 use super::drawn_feature::{DrawnFeature, measured, shape_of};
 use super::source::inspected_file;
 use super::words::first_few;
-use crate::conformity::{GeneralTolerance, InspectedQuantity, ToleranceLimits};
-use crate::features::{Feature, Measured};
+use crate::conformity::{GeneralTolerance, ToleranceLimits};
+use crate::features::{Feature, InspectedQuantity, Measured};
 use crate::io::features_file::{FeatureFile, FeatureRecord};
 use crate::io::inspection_file::InspectedFile;
 use crate::io::mesh_file::MeshUnit;
@@ -300,19 +300,20 @@ fn of_features(features: &[FeatureRecord], params: &DrawingParams) -> Vec<(Nomin
             axis: feature.axis,
             ..NominalRecord::default()
         };
-        let depth = feature
-            .depth_mm
-            .filter(|_| feature.through != Some(true) && feature.depth_is_at_least.is_none());
+        let has_depth = feature.through != Some(true) && feature.depth_is_at_least.is_none();
         let sizes = [
-            (InspectedQuantity::Diameter, feature.diameter_mm),
-            (InspectedQuantity::Width, feature.width_mm),
-            (InspectedQuantity::Length, feature.length_mm),
-            (InspectedQuantity::Depth, depth),
+            InspectedQuantity::Diameter,
+            InspectedQuantity::Width,
+            InspectedQuantity::Length,
+            InspectedQuantity::Depth,
         ];
-        for (quantity, size) in sizes {
-            let Some(size) = size else { continue };
+        for quantity in sizes {
+            let is_drawn = quantity != InspectedQuantity::Depth || has_depth;
+            let Some(size) = feature.number(quantity).filter(|_| is_drawn) else {
+                continue;
+            };
             let name = format!("{kind} {count} {}", quantity.parts().0);
-            let nominal_mm = Some(rounded(size));
+            let nominal_mm = Some(rounded(size.value));
             let is_round = matches!(
                 quantity,
                 InspectedQuantity::Diameter | InspectedQuantity::Length

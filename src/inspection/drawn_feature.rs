@@ -26,13 +26,7 @@ impl DrawnFeature {
 
     /// Diameter or width, m.
     pub fn size(&self) -> Option<f64> {
-        Some(
-            self.shape
-                .diameter
-                .as_ref()
-                .or(self.shape.width.as_ref())?
-                .value,
-        )
+        Some(self.shape.main_size()?.value)
     }
 }
 

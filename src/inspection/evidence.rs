@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
-use crate::conformity::InspectedQuantity;
+use crate::features::InspectedQuantity;
 use crate::io::features_file::FeatureRecord;
 use crate::io::probed_touches_file::TouchLine;
 use crate::stylus::ProbedPoint;

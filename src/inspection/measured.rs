@@ -2,8 +2,9 @@
 
 use nalgebra::{Point3, Vector3};
 
-use crate::conformity::{InspectedQuantity, MeasuredNumber, coordinate_std, position};
-use crate::features::{FittedTo, Kind, LEAST_TOUCHES, LEAST_TURN};
+use super::drawn_feature::measured;
+use crate::conformity::{MeasuredNumber, place_number};
+use crate::features::{FittedTo, InspectedQuantity, Kind, LEAST_TOUCHES, LEAST_TURN};
 use crate::io::features_file::{FeatureFile, FeatureRecord, RelationRecord};
 
 /// What a file says of a characteristic.
@@ -17,7 +18,7 @@ pub(super) struct CharacteristicMeasurement {
 }
 
 impl CharacteristicMeasurement {
-    fn none(why: String) -> Self {
+    pub fn none(why: String) -> Self {
         Self {
             why_none: Some(why),
             ..Self::default()
@@ -70,7 +71,6 @@ pub(super) fn missing_touches(feature: &FeatureRecord, quantity: InspectedQuanti
 
 /// - `nominal_mm`: centre of the feature in the drawing.
 /// - `datum`: the feature that the quantity relates to.
-#[expect(clippy::too_many_lines)]
 pub(super) fn measurement(
     file: &FeatureFile,
     feature: &FeatureRecord,
@@ -79,84 +79,42 @@ pub(super) fn measurement(
     nominal_mm: Option<[f64; 3]>,
     datum: Option<&FeatureRecord>,
 ) -> CharacteristicMeasurement {
-    let not_measured = || {
-        let touch_it = if is_of_mesh(feature) {
-            missing_touches(feature, quantity)
-        } else {
-            "touch it".to_owned()
-        };
-        CharacteristicMeasurement::none(format!(
-            "{quantity} of feature {} was not measured: {touch_it}",
-            feature.id
-        ))
+    if quantity.needs_datum() {
+        return datum.map_or_else(
+            || CharacteristicMeasurement::none("its datum was not found".to_owned()),
+            |datum| related(file, feature, datum, quantity),
+        );
+    }
+    let of_place = || {
+        let centre = measured(
+            Point3::from(feature.center_mm?),
+            feature.std.get("center_mm").copied(),
+        );
+        let axis = feature.axis.map(Vector3::from);
+        let nominal = nominal_mm.map(Point3::from);
+        place_number(quantity, kind, &centre, axis, nominal.as_ref())
     };
-    let name = quantity.name();
-    let own = |value: Option<f64>, is_at_least: bool| {
-        let std = feature.std.get(name).copied();
-        (
-            value.map(|value| MeasuredNumber {
-                value,
-                std,
-                is_at_least,
-            }),
-            runs_of(feature, name),
-        )
+    let behind = if InspectedQuantity::SIZES.contains(&quantity) {
+        quantity.name()
+    } else {
+        surface(feature)
     };
-    let (number, runs) = match quantity {
-        InspectedQuantity::Diameter => own(feature.diameter_mm, false),
-        InspectedQuantity::Width => own(feature.width_mm, false),
-        InspectedQuantity::Length => own(feature.length_mm, false),
-        InspectedQuantity::Depth => own(feature.depth_mm, feature.depth_is_at_least == Some(true)),
-        InspectedQuantity::ConeAngle => own(feature.cone_angle_deg, false),
-        InspectedQuantity::X | InspectedQuantity::Y | InspectedQuantity::Z => {
-            let axis = [
-                InspectedQuantity::X,
-                InspectedQuantity::Y,
-                InspectedQuantity::Z,
-            ]
-            .iter()
-            .position(|one| *one == quantity)
-            .unwrap_or(0);
-            (
-                coordinate(feature, kind, axis),
-                runs_of(feature, surface(feature)),
-            )
-        }
-        InspectedQuantity::Position => {
-            let number = feature
-                .center_mm
-                .zip(nominal_mm)
-                .and_then(|(centre, nominal)| {
-                    let std = feature.std.get("center_mm").copied();
-                    position(
-                        kind,
-                        &Point3::from(centre),
-                        feature.axis.map(Vector3::from),
-                        std,
-                        &Point3::from(nominal),
-                    )
-                });
-            (number, runs_of(feature, surface(feature)))
-        }
-        InspectedQuantity::Roundness
-        | InspectedQuantity::Cylindricity
-        | InspectedQuantity::Straightness
-        | InspectedQuantity::Flatness => {
-            (form(feature, quantity), runs_of(feature, surface(feature)))
-        }
-        _ => {
-            let Some(datum) = datum else {
-                return CharacteristicMeasurement::none("its datum was not found".to_owned());
+    match feature.number(quantity).or_else(of_place) {
+        None => {
+            let touch_it = if is_of_mesh(feature) {
+                missing_touches(feature, quantity)
+            } else {
+                "touch it".to_owned()
             };
-            return related(file, feature, datum, quantity);
+            CharacteristicMeasurement::none(format!(
+                "{quantity} of feature {} was not measured: {touch_it}",
+                feature.id
+            ))
         }
-    };
-    match number {
-        None => not_measured(),
         number => CharacteristicMeasurement {
             number,
             why_none: None,
-            runs,
+            runs: runs_of(feature, behind),
         },
     }
 }
@@ -174,55 +132,6 @@ fn runs_of(feature: &FeatureRecord, name: &str) -> Vec<[u32; 2]> {
     feature.touches.get(name).cloned().unwrap_or_default()
 }
 
-fn coordinate(feature: &FeatureRecord, kind: Kind, axis: usize) -> Option<MeasuredNumber> {
-    let value = feature.center_mm?[axis];
-    let direction = Vector3::ith(axis, 1.0);
-    let of_centre = feature.std.get("center_mm").copied();
-    let std = of_centre
-        .and_then(|std| coordinate_std(kind, feature.axis.map(Vector3::from), std, &direction));
-    Some(MeasuredNumber {
-        value,
-        std,
-        is_at_least: false,
-    })
-}
-
-fn form(feature: &FeatureRecord, quantity: InspectedQuantity) -> Option<MeasuredNumber> {
-    let form = feature.form.as_ref()?;
-    let value = match quantity {
-        InspectedQuantity::Roundness => form.roundness_mm,
-        InspectedQuantity::Cylindricity => form.cylindricity_mm,
-        InspectedQuantity::Straightness => form.straightness_mm,
-        _ => form.flatness_mm,
-    };
-    Some(MeasuredNumber {
-        value: value?,
-        std: form.std.get(quantity.name()).copied(),
-        is_at_least: false,
-    })
-}
-
-/// A number of a relation by its name.
-pub(super) fn relation_number(
-    relation: &RelationRecord,
-    quantity: InspectedQuantity,
-) -> Option<MeasuredNumber> {
-    let value = match quantity {
-        InspectedQuantity::Perpendicularity => relation.perpendicularity_mm,
-        InspectedQuantity::Parallelism => relation.parallelism_mm,
-        InspectedQuantity::Coaxiality => relation.coaxiality_mm,
-        InspectedQuantity::Concentricity => relation.concentricity_mm,
-        InspectedQuantity::Distance => relation.distance_mm,
-        InspectedQuantity::Angle => relation.angle_deg,
-        _ => None,
-    };
-    Some(MeasuredNumber {
-        value: value?,
-        std: relation.std.get(quantity.name()).copied(),
-        is_at_least: false,
-    })
-}
-
 fn related(
     file: &FeatureFile,
     feature: &FeatureRecord,
@@ -235,7 +144,7 @@ fn related(
             .iter()
             .filter(|relation| relation.of == of && relation.to == to);
         of_both
-            .filter_map(|relation| Some((relation, relation_number(relation, quantity)?)))
+            .filter_map(|relation| Some((relation, relation.number(quantity)?)))
             .next()
     };
     // between two axes the distance and the angle are the same from either

@@ -13,10 +13,10 @@ use super::source::InspectionSource;
 use super::words::first_few;
 use super::{InspectionError, InspectionParams};
 use crate::conformity::{
-    Assessment, Decision, FeatureMatch, FeaturePlace, InspectedQuantity, SoughtFeature,
-    ToleranceLimits, assess, match_features,
+    Assessment, Decision, FeatureMatch, FeaturePlace, SoughtFeature, ToleranceLimits, assess,
+    match_features,
 };
-use crate::features::Kind;
+use crate::features::{InspectedQuantity, Kind};
 use crate::io::features_file::{FeatureFile, FeatureRecord};
 use crate::io::inspection_file::{CharacteristicRecord, InspectionRecord};
 use crate::io::machine::VERSION;
@@ -277,7 +277,7 @@ fn characteristic(
     let feature = found_feature(matched, file);
     let datum_feature = datum.as_ref().and_then(|datum| found_feature(datum, file));
     let measured = match (feature, datum, datum_feature) {
-        (None, ..) => missing(why_not(
+        (None, ..) => CharacteristicMeasurement::none(why_not(
             matched,
             &nominal.kind,
             nominal,
@@ -290,7 +290,7 @@ fn characteristic(
                 feature: record.feature,
                 ..NominalRecord::default()
             };
-            missing(format!(
+            CharacteristicMeasurement::none(format!(
                 "datum: {}",
                 why_not(datum, &record.kind, &as_nominal, params.align.is_some())
             ))
@@ -375,13 +375,6 @@ fn characteristic(
         .into_iter()
         .for_each(|(name, number)| record.set(name, number));
     (record, measured.runs)
-}
-
-fn missing(why: String) -> CharacteristicMeasurement {
-    CharacteristicMeasurement {
-        why_none: Some(why),
-        ..CharacteristicMeasurement::default()
-    }
 }
 
 /// Kinds that a drawing would have a characteristic for.

@@ -142,6 +142,16 @@ def test_lengths_angles_and_forces_are_si():
     assert not [name for name in names if re.search(r"_(mm|deg|um|ms|us|percent)$", name)]
 
 
+FEATURES = ROOT / "crates/touchup-core/src/features"
+
+
+def quantities(file, part):
+    """Names of the quantities in a part of a source, without units."""
+    named = dict(re.findall(r"^ *(\w+) = \"(\w+)_(?:mm|deg)\",$", (FEATURES / "quantity.rs").read_text(), re.MULTILINE))
+    found = re.search(part, (FEATURES / file).read_text(), re.DOTALL)[0]
+    return {named[name] for name in re.findall(r"(?:InspectedQuantity|Self)::(\w+)", found) if name in named}
+
+
 def test_a_feature_mirrors_the_file_of_features():
     source = (ROOT / "crates/touchup-io/src/features_file.rs").read_text()
     record = re.search(r"pub struct FeatureRecord, .*?\{(.*?)\n    \}", source, re.DOTALL)[1]
@@ -149,7 +159,7 @@ def test_a_feature_mirrors_the_file_of_features():
     mine = {name for _, name, _ in fields(sections("msg/Feature.msg")[0])}
     # one std and one list of touches by name there, a field for each number and their count here
     known = re.search(r"fn known\(.*?\n\}", source, re.DOTALL)[0]
-    stds = set(re.findall(r"\"(\w+?)_(?:mm|deg)\"", known))
+    stds = set(re.findall(r"\"(\w+?)_(?:mm|deg)\"", known)) | quantities("quantity.rs", r"const SIZES.*?\];")
     assert {name.removesuffix("_std") for name in mine if name.endswith("_std")} == stds
     # only a live session has flags
     only_live = {"status", "search_radius", "touch_count"}
@@ -159,20 +169,21 @@ def test_a_feature_mirrors_the_file_of_features():
 
 
 @pytest.mark.parametrize(
-    ("message", "selector", "record"),
-    [("FormDeviation", "characteristic", "FormRecord"), ("Relation", "kind", "RelationRecord")],
+    ("message", "selector", "record", "numbers"),
+    [("FormDeviation", "characteristic", "FormRecord", "deviations"), ("Relation", "kind", "RelationRecord", "numbers")],
 )
-def test_form_and_relations_mirror_the_file_of_features(message, selector, record):
+def test_form_and_relations_mirror_the_file_of_features(message, selector, record, numbers):
     """Each length and angle that the file names is a value of the selector, or a field of its own."""
     source = (ROOT / "crates/touchup-io/src/features_file.rs").read_text()
     body = re.search(rf"pub struct {record}, .*?\{{(.*?)\n    \}}", source, re.DOTALL)[1]
     in_file = {re.sub(r"_(mm|deg)$", "", name) for name in re.findall(r"^        pub (\w+)\??:", body, re.MULTILINE)}
+    in_file |= quantities("numbers.rs", rf"pub fn {numbers}\(.*?\n    \}}")
     definition = sections(f"msg/{message}.msg")[0]
     names = {name.removesuffix("_feature") for _, name, _ in fields(definition)} - {selector}
     constants = {name.lower() for name in re.findall(r"^uint8 (\w+)=\d+$", definition, re.MULTILINE)}
     # one zone for the kind there, a field named after the kind in the file
     in_message = (names | constants) - {"zone", "zone_std"}
-    assert {name for name in in_message if not name.endswith("_std")} == in_file - {"std", selector}
+    assert {name for name in in_message if not name.endswith("_std")} == in_file - {"std", "numbers", selector}
 
 
 def test_kinds_are_those_of_the_program():

@@ -5,12 +5,15 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use nalgebra::Point3;
+use serde::de::{Deserializer, Error as _};
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
 use super::file_error::{FileError, read_file, write_file};
+use touchup_core::conformity::MeasuredNumber;
 use touchup_core::features::clusters::{Bend, Cluster};
-use touchup_core::features::{Feature, Form, Measured, Relation, RelationKind, relations};
-use touchup_core::form::{Deviation, Estimate, RoundForm};
+use touchup_core::features::{Feature, Form, InspectedQuantity, Measured, Relation, relations};
+use touchup_core::form::Deviation;
 
 /// Why a file of features could not be read or written.
 #[derive(Debug, thiserror::Error)]
@@ -64,15 +67,13 @@ reported! {
     /// noise may hide.
     #[derive(Clone, Deserialize)]
     pub struct FormRecord, fn of(form: &Form) {
-        /// round walls: of the mean section
-        pub roundness_mm?: f64 = form_number(form, "roundness_mm"),
-        /// round walls that were touched at several heights
-        pub cylindricity_mm?: f64 = form_number(form, "cylindricity_mm"),
-        /// round walls that were touched at three heights all around: diameter of the cylinder that
-        /// holds the axis
-        pub straightness_mm?: f64 = form_number(form, "straightness_mm"),
-        /// planes
-        pub flatness_mm?: f64 = form_number(form, "flatness_mm"),
+        /// `roundness_mm`, `cylindricity_mm`, `straightness_mm` (of the axis) of round walls,
+        /// `flatness_mm` of planes
+        #[serde(flatten, deserialize_with = "known_numbers")]
+        pub numbers: NumbersByQuantity = form
+            .deviations()
+            .map(|(quantity, deviation)| (quantity, quantity.from_si(deviation.minimum_zone.value)))
+            .collect(),
         /// the same by their names about the reference of least squares
         #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
         pub least_squares: BTreeMap<String, f64> = estimates(form, |deviation| deviation.least_squares.value),
@@ -82,51 +83,56 @@ reported! {
         /// share of the turn, or of the rectangle around the touches, that they cover: the form of
         /// the rest is not known
         #[serde(default)]
-        pub coverage: f64 = match form {
-            Form::Round(round) => round.coverage,
-            Form::Flat(flat) => flat.coverage,
-        },
+        pub coverage: f64 = form.coverage(),
         /// round walls: most undulations per turn that were looked for
-        pub undulations?: u32 = round_of(form).map(|round| round.undulations),
+        pub undulations?: u32 = form.round().map(|round| round.undulations),
         /// round walls: undulations per turn of what was found
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
-        pub lobes: Vec<u32> = round_of(form).map_or_else(Vec::new, |round| round.lobes.clone()),
+        pub lobes: Vec<u32> = form.round().map_or_else(Vec::new, |round| round.lobes.clone()),
     }
-}
-
-fn round_of(form: &Form) -> Option<&RoundForm> {
-    if let Form::Round(round) = form {
-        Some(round)
-    } else {
-        None
-    }
-}
-
-/// The deviations of a form by the names of their numbers.
-fn deviations(form: &Form) -> impl Iterator<Item = (&'static str, Deviation)> {
-    let all = match form {
-        Form::Round(round) => [
-            ("roundness_mm", Some(round.roundness)),
-            ("cylindricity_mm", round.cylindricity),
-            ("straightness_mm", round.straightness),
-        ],
-        Form::Flat(flat) => [("flatness_mm", Some(flat.flatness)), ("", None), ("", None)],
-    };
-    all.into_iter()
-        .filter_map(|(name, deviation)| Some((name, deviation?)))
-}
-
-/// Width of the narrowest zone, mm.
-fn form_number(form: &Form, name: &str) -> Option<f64> {
-    deviations(form)
-        .find(|(own, _)| *own == name)
-        .map(|(_, deviation)| deviation.minimum_zone.value * 1e3)
 }
 
 fn estimates(form: &Form, number: impl Fn(Deviation) -> f64) -> BTreeMap<String, f64> {
-    deviations(form)
-        .map(|(name, deviation)| (name.to_owned(), number(deviation) * 1e3))
+    form.deviations()
+        .map(|(quantity, deviation)| {
+            (
+                quantity.name().to_owned(),
+                quantity.from_si(number(deviation)),
+            )
+        })
         .collect()
+}
+
+/// Numbers by their quantities, mm and degrees.
+type NumbersByQuantity = BTreeMap<InspectedQuantity, f64>;
+
+/// Keys of other names are passed over.
+fn known_numbers<'de, D: Deserializer<'de>>(object: D) -> Result<NumbersByQuantity, D::Error> {
+    BTreeMap::<String, Option<Value>>::deserialize(object)?
+        .into_iter()
+        .filter_map(|(name, value)| Some((InspectedQuantity::of_name(&name)?, value?)))
+        .map(|(quantity, value)| Ok((quantity, f64::deserialize(value).map_err(D::Error::custom)?)))
+        .collect()
+}
+
+/// A number of a record with its standard uncertainty.
+fn with_std(
+    value: Option<f64>,
+    std: &BTreeMap<String, f64>,
+    quantity: InspectedQuantity,
+) -> Option<MeasuredNumber> {
+    Some(MeasuredNumber {
+        value: value?,
+        std: std.get(quantity.name()).copied(),
+        is_at_least: false,
+    })
+}
+
+impl FormRecord {
+    /// A deviation, mm.
+    pub fn number(&self, quantity: InspectedQuantity) -> Option<MeasuredNumber> {
+        with_std(self.numbers.get(&quantity).copied(), &self.std, quantity)
+    }
 }
 
 reported! {
@@ -139,48 +145,34 @@ reported! {
         pub of: u32 = relation.of,
         /// `id` of the datum
         pub to: u32 = relation.to,
-        /// width of the zone between parallel planes, of an axis square to a plane diameter of the
-        /// cylinder
-        pub perpendicularity_mm?: f64 = relation_number(relation, "perpendicularity_mm"),
-        /// width of the zone between parallel planes, of an axis diameter of the cylinder
-        pub parallelism_mm?: f64 = relation_number(relation, "parallelism_mm"),
-        /// diameter of the cylinder about the axis of the datum that holds the axis
-        pub coaxiality_mm?: f64 = relation_number(relation, "coaxiality_mm"),
-        /// diameter of the circle about the axis of the datum that holds the middle of the axis
-        pub concentricity_mm?: f64 = relation_number(relation, "concentricity_mm"),
-        /// of the middle of what was touched from the datum
-        pub distance_mm?: f64 = relation_number(relation, "distance_mm"),
-        /// between normals, axes, or an axis and a plane, 0 to 90
-        pub angle_deg?: f64 = relation_number(relation, "angle_deg"),
+        /// - `perpendicularity_mm`: width of the zone between parallel planes, of an axis square to a
+        ///   plane diameter of the cylinder
+        /// - `parallelism_mm`: width of the zone between parallel planes, of an axis diameter of the
+        ///   cylinder
+        /// - `coaxiality_mm`: diameter of the cylinder about the axis of the datum that holds the axis
+        /// - `concentricity_mm`: diameter of the circle about the axis of the datum that holds the
+        ///   middle of the axis
+        /// - `distance_mm`: of the middle of the touched part from the datum
+        /// - `angle_deg`: between normals, axes, or an axis and a plane, 0 to 90
+        #[serde(flatten, deserialize_with = "known_numbers")]
+        pub numbers: NumbersByQuantity = relation
+            .numbers()
+            .map(|(quantity, estimate)| (quantity, quantity.from_si(estimate.value)))
+            .collect(),
         /// standard uncertainties by name of the number
         #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-        pub std: BTreeMap<String, f64> = relation_numbers(relation)
-            .map(|(name, estimate, unit)| (name.to_owned(), estimate.std * unit))
+        pub std: BTreeMap<String, f64> = relation
+            .numbers()
+            .map(|(quantity, estimate)| (quantity.name().to_owned(), quantity.from_si(estimate.std)))
             .collect(),
     }
 }
 
-/// The numbers of a relation by their names, each with its unit.
-fn relation_numbers(relation: &Relation) -> impl Iterator<Item = (&'static str, Estimate, f64)> {
-    let zone = match relation.kind {
-        RelationKind::Perpendicularity => "perpendicularity_mm",
-        RelationKind::Parallelism => "parallelism_mm",
-        RelationKind::Coaxiality | RelationKind::Distance => "coaxiality_mm",
-    };
-    let all = [
-        (zone, relation.zone, 1e3),
-        ("concentricity_mm", relation.concentricity, 1e3),
-        ("distance_mm", relation.distance, 1e3),
-        ("angle_deg", relation.angle, 1f64.to_degrees()),
-    ];
-    all.into_iter()
-        .filter_map(|(name, estimate, unit)| Some((name, estimate?, unit)))
-}
-
-fn relation_number(relation: &Relation, name: &str) -> Option<f64> {
-    relation_numbers(relation)
-        .find(|(own, ..)| *own == name)
-        .map(|(_, estimate, unit)| estimate.value * unit)
+impl RelationRecord {
+    /// A number of the relation, mm or degrees.
+    pub fn number(&self, quantity: InspectedQuantity) -> Option<MeasuredNumber> {
+        with_std(self.numbers.get(&quantity).copied(), &self.std, quantity)
+    }
 }
 
 reported! {
@@ -199,24 +191,24 @@ reported! {
         /// outward normal. Unit vector
         pub axis?: [f64; 3] = feature.axis.as_ref().map(|axis| axis.value.into()),
         /// hole, boss
-        pub diameter_mm?: f64 = times(&feature.diameter, 1e3),
+        pub diameter_mm?: f64 = size(feature, InspectedQuantity::Diameter),
         /// slot: over its ends, of an open one as far as its walls go; pocket; edge: as far as it
         /// was seen
-        pub length_mm?: f64 = times(&feature.length, 1e3),
+        pub length_mm?: f64 = size(feature, InspectedQuantity::Length),
         /// slot, pocket
-        pub width_mm?: f64 = times(&feature.width, 1e3),
+        pub width_mm?: f64 = size(feature, InspectedQuantity::Width),
         /// hole, slot, pocket: from opening to floor, of one that goes through as far as its wall
         /// goes (of a drilled hole without the tip; of a round opening in a sheet left out, as is
         /// `through`); boss: its height. Where the wall was touched and floor or top was not, as
         /// far as that was: see `depth_is_at_least`
-        pub depth_mm?: f64 = times(&feature.depth, 1e3),
+        pub depth_mm?: f64 = size(feature, InspectedQuantity::Depth),
         /// whether `depth_mm` is a lower bound; left out where it is none
         pub depth_is_at_least?: bool = feature.depth.as_ref().filter(|depth| depth.is_at_least).map(|_| true),
         /// hole, slot, pocket; left out where the mesh ends before the hole does, or its floor is
         /// untouched
         pub through?: bool = feature.through,
         /// hole: full angle of its countersink
-        pub cone_angle_deg?: f64 = times(&feature.cone_angle, 1f64.to_degrees()),
+        pub cone_angle_deg?: f64 = size(feature, InspectedQuantity::ConeAngle),
         /// slot, pocket: along it, unit vector
         pub direction?: [f64; 3] = feature.direction.map(Into::into),
         /// holes with the same number are steps of one
@@ -262,26 +254,41 @@ fn known(feature: &Feature) -> impl Iterator<Item = KnownNumber<'_>> {
     fn note<'a, T>(name: &'static str, measured: &'a Measured<T>, unit: f64) -> KnownNumber<'a> {
         (name, measured.std.map(|std| std * unit), &measured.touches)
     }
-    let numbers = [
-        ("diameter_mm", &feature.diameter, 1e3),
-        ("length_mm", &feature.length, 1e3),
-        ("width_mm", &feature.width, 1e3),
-        ("depth_mm", &feature.depth, 1e3),
-        ("cone_angle_deg", &feature.cone_angle, 1f64.to_degrees()),
-    ];
     let centre = note("center_mm", &feature.centre, 1e3);
     let axis = feature
         .axis
         .as_ref()
         .map(|axis| note("axis_deg", axis, 1f64.to_degrees()));
-    let numbers = numbers
-        .into_iter()
-        .filter_map(|(name, number, unit)| Some(note(name, number.as_ref()?, unit)));
-    [centre].into_iter().chain(axis).chain(numbers)
+    let sizes = feature
+        .sizes()
+        .map(|(quantity, size)| note(quantity.name(), size, quantity.from_si(1.0)));
+    [centre].into_iter().chain(axis).chain(sizes)
 }
 
-fn times(measured: &Option<Measured<f64>>, unit: f64) -> Option<f64> {
-    measured.as_ref().map(|measured| measured.value * unit)
+/// A size, mm or degrees.
+fn size(feature: &Feature, quantity: InspectedQuantity) -> Option<f64> {
+    let (_, size) = feature.sizes().find(|(own, _)| *own == quantity)?;
+    Some(quantity.from_si(size.value))
+}
+
+impl FeatureRecord {
+    /// A size or deviation of form, mm or degrees.
+    pub fn number(&self, quantity: InspectedQuantity) -> Option<MeasuredNumber> {
+        let value = match quantity {
+            InspectedQuantity::Diameter => self.diameter_mm,
+            InspectedQuantity::Length => self.length_mm,
+            InspectedQuantity::Width => self.width_mm,
+            InspectedQuantity::Depth => self.depth_mm,
+            InspectedQuantity::ConeAngle => self.cone_angle_deg,
+            _ => return self.form.as_ref()?.number(quantity),
+        };
+        let is_at_least =
+            quantity == InspectedQuantity::Depth && self.depth_is_at_least == Some(true);
+        Some(MeasuredNumber {
+            is_at_least,
+            ..with_std(value, &self.std, quantity)?
+        })
+    }
 }
 
 fn point_mm(p: &Point3<f64>) -> [f64; 3] {

@@ -8,10 +8,9 @@ use nalgebra::{Point3, Vector3};
 use super::report::kind_of;
 use crate::cli::{CliError, require};
 use crate::conformity::{
-    DecisionParams, FeatureMatch, FeaturePlace, InspectedQuantity, SoughtFeature, ToleranceLimits,
-    match_features,
+    DecisionParams, FeatureMatch, FeaturePlace, SoughtFeature, ToleranceLimits, match_features,
 };
-use crate::features::Kind;
+use crate::features::{InspectedQuantity, Kind};
 use crate::io::nominal_file::{NominalRecord, NominalTolerance, read_nominal};
 use crate::probing::execute::{Flag, StaticWorld, World};
 use crate::probing::plan::{DecisionGoal, SoughtCharacteristic};

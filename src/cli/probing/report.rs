@@ -9,7 +9,7 @@ use crate::cli::refinement::RefineSummary;
 use crate::cli::told::ToldNumbers;
 use crate::cli::{counted, reported};
 use crate::conformity::Decision;
-use crate::features::Kind;
+use crate::features::{InspectedQuantity, Kind};
 use crate::io::features_file::FeatureRecord;
 use crate::probing::arm::SlideRecord;
 use crate::probing::execute::{Ending, Flag, Probed, ProbedSlide, ProbedTouch, ReferenceTouch};
@@ -426,13 +426,12 @@ impl fmt::Display for SlideRecordOfFile {
 
 /// Numbers of a feature with their standard uncertainties, mm.
 fn numbers(feature: &FeatureRecord) -> String {
-    let with = |name: &str, value: Option<f64>, key: &str| {
-        value.map(|value| match feature.std.get(key) {
-            Some(std) => format!("{name}{value:.3} ± {std:.3}"),
-            None if key == "depth_mm" && feature.depth_is_at_least == Some(true) => {
-                format!("{name}≥ {value:.3}")
-            }
-            None => format!("{name}{value:.3}"),
+    let with = |name: &str, quantity| {
+        let number = feature.number(quantity)?;
+        let bound = if number.is_at_least { "≥ " } else { "" };
+        Some(match number.std {
+            Some(std) => format!("{name}{:.3} ± {std:.3}", number.value),
+            None => format!("{name}{bound}{:.3}", number.value),
         })
     };
     let centre = feature.center_mm.map(|[x, y, z]| {
@@ -444,10 +443,10 @@ fn numbers(feature: &FeatureRecord) -> String {
     });
     let all = [
         centre,
-        with("Ø", feature.diameter_mm, "diameter_mm"),
-        with("length ", feature.length_mm, "length_mm"),
-        with("width ", feature.width_mm, "width_mm"),
-        with("depth ", feature.depth_mm, "depth_mm"),
+        with("Ø", InspectedQuantity::Diameter),
+        with("length ", InspectedQuantity::Length),
+        with("width ", InspectedQuantity::Width),
+        with("depth ", InspectedQuantity::Depth),
     ];
     format!(
         "{} mm",

@@ -158,11 +158,7 @@ fn matched(
         kind: feature.kind,
         centre: motion * feature.centre.value,
         axis: feature.axis.as_ref().map(|axis| motion * axis.value),
-        size: feature
-            .diameter
-            .as_ref()
-            .or(feature.width.as_ref())
-            .map(|size| size.value),
+        size: feature.main_size().map(|size| size.value),
     };
     let places: Vec<_> = measured.iter().map(place).collect();
     let sought = |one: &DrawnFeature| SoughtFeature {

@@ -1,7 +1,7 @@
 //! The table of characteristics with their decisions.
 
 use super::tolerance_bar::tolerance_bar;
-use crate::conformity::InspectedQuantity;
+use crate::features::InspectedQuantity;
 use crate::html::{escaped, table as html_table};
 use crate::inspection::rows::Inspected;
 use crate::io::inspection_file::CharacteristicRecord;

@@ -1,7 +1,8 @@
 //! The decision rule in words and formulas, and the symbols.
 
 use super::sections::rule_name;
-use crate::conformity::{DecisionRule, InspectedQuantity};
+use crate::conformity::DecisionRule;
+use crate::features::InspectedQuantity;
 use crate::inspection::words::percent;
 use crate::io::inspection_file::InspectionRecord;
 use touchup_core::numeric::normal_quantile;

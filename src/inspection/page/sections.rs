@@ -2,10 +2,10 @@
 
 use super::decisions::{in_words, shown};
 use super::input::ReportInput;
-use crate::conformity::{Decision, InspectedQuantity, MeasuredNumber};
+use crate::conformity::{Decision, MeasuredNumber};
+use crate::features::InspectedQuantity;
 use crate::html::{escaped, table};
 use crate::inspection::calibration::CalibrationLine;
-use crate::inspection::measured::relation_number;
 use crate::inspection::words::first_few;
 use crate::io::inspection_file::InspectionRecord;
 
@@ -116,20 +116,16 @@ pub(super) fn form_and_relations(input: &ReportInput<'_>) -> String {
         let Some(form) = feature.and_then(|feature| feature.form.as_ref()) else {
             continue;
         };
-        let number = |quantity: InspectedQuantity, value: Option<f64>| {
-            let number = value.map(|value| MeasuredNumber {
-                value,
-                std: form.std.get(quantity.name()).copied(),
-                is_at_least: false,
-            });
-            number.map_or("–".to_owned(), |number| with_u(&number))
+        let number = |quantity| {
+            form.number(quantity)
+                .map_or("–".to_owned(), |number| with_u(&number))
         };
         forms.push(vec![
             format!("{} · {}", one.number, escaped(&one.kind)),
-            number(InspectedQuantity::Roundness, form.roundness_mm),
-            number(InspectedQuantity::Cylindricity, form.cylindricity_mm),
-            number(InspectedQuantity::Straightness, form.straightness_mm),
-            number(InspectedQuantity::Flatness, form.flatness_mm),
+            number(InspectedQuantity::Roundness),
+            number(InspectedQuantity::Cylindricity),
+            number(InspectedQuantity::Straightness),
+            number(InspectedQuantity::Flatness),
             format!("{:.0} %", form.coverage * 100.0),
         ]);
     }
@@ -151,7 +147,7 @@ pub(super) fn form_and_relations(input: &ReportInput<'_>) -> String {
     let all: Vec<_> = of_balloons
         .map(|relation| {
             let numbers = quantities.clone().filter_map(|quantity| {
-                let number = relation_number(relation, quantity)?;
+                let number = relation.number(quantity)?;
                 let unit = if quantity.unit() == "deg" {
                     "°"
                 } else {

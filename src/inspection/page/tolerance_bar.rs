@@ -3,7 +3,7 @@
 
 use std::fmt::Write;
 
-use crate::conformity::InspectedQuantity;
+use crate::features::InspectedQuantity;
 use crate::io::inspection_file::CharacteristicRecord;
 
 /// Pixels.

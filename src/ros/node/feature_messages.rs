@@ -3,8 +3,7 @@
 use nalgebra::{Point3, Rotation3, UnitQuaternion, Vector3};
 
 use super::convert::{NO_VECTOR, point, point_of, pose, vector, vector_of};
-use crate::features::{Feature, FittedTo, Form, Kind, Measured, Relation, RelationKind};
-use crate::form::{Deviation, Estimate};
+use crate::features::{Feature, FittedTo, Form, InspectedQuantity, Kind, Relation, RelationKind};
 use crate::probing::execute::Flag;
 use crate::ros::messages::{
     ColorRGBA, Feature as FeatureMsg, FeatureArray, FormDeviation, Marker, MarkerArray, Point,
@@ -55,21 +54,14 @@ pub fn kind_of(number: u8) -> Result<Option<Kind>, String> {
 /// - `id`: the number by which it is known.
 /// - `search_radius`: how far around it was looked when somebody flagged it, m.
 pub fn found(feature: &Feature, id: u32, search_radius: Option<f64>) -> FeatureMsg {
-    let number = |measured: &Option<Measured<f64>>| measured.as_ref().map_or(f64::NAN, |m| m.value);
-    let std = |measured: &Option<Measured<f64>>| {
-        measured.as_ref().and_then(|m| m.std).unwrap_or(f64::NAN)
-    };
     let yes_no = |known: Option<bool>| match known {
         None => FeatureMsg::UNKNOWN,
         Some(false) => FeatureMsg::NO,
         Some(true) => FeatureMsg::YES,
     };
-    let sized = feature
-        .diameter
-        .as_ref()
-        .or(feature.width.as_ref())
-        .map(|m| m.touches.len());
-    FeatureMsg {
+    let sized = feature.main_size().map(|size| size.touches.len());
+    let axis = feature.axis.as_ref();
+    let mut message = FeatureMsg {
         id,
         kind: number_of(Some(feature.kind)),
         status: FeatureMsg::STATUS_FOUND,
@@ -82,30 +74,13 @@ pub fn found(feature: &Feature, id: u32, search_radius: Option<f64>) -> FeatureM
         search_radius: search_radius.unwrap_or(f64::NAN),
         center: point(&feature.centre.value),
         center_std: feature.centre.std.unwrap_or(f64::NAN),
-        axis: feature
-            .axis
-            .as_ref()
-            .map_or(NO_VECTOR, |axis| vector(&axis.value)),
-        axis_std: feature
-            .axis
-            .as_ref()
-            .and_then(|axis| axis.std)
-            .unwrap_or(f64::NAN),
+        axis: axis.map_or(NO_VECTOR, |axis| vector(&axis.value)),
+        axis_std: axis.and_then(|axis| axis.std).unwrap_or(f64::NAN),
         direction: feature.direction.as_ref().map_or(NO_VECTOR, vector),
-        diameter: number(&feature.diameter),
-        diameter_std: std(&feature.diameter),
-        length: number(&feature.length),
-        length_std: std(&feature.length),
-        width: number(&feature.width),
-        width_std: std(&feature.width),
-        depth: number(&feature.depth),
-        depth_std: std(&feature.depth),
         depth_is_at_least: feature
             .depth
             .as_ref()
             .is_some_and(|depth| depth.is_at_least),
-        cone_angle: number(&feature.cone_angle),
-        cone_angle_std: std(&feature.cone_angle),
         through: yes_no(feature.through),
         convex: yes_no(feature.is_convex),
         group: feature
@@ -114,42 +89,40 @@ pub fn found(feature: &Feature, id: u32, search_radius: Option<f64>) -> FeatureM
             .unwrap_or(FeatureMsg::NO_GROUP),
         points: feature.points.iter().map(point).collect(),
         form: feature.form.as_ref().map_or_else(Vec::new, form_deviations),
+        ..unknown_feature(id)
+    };
+    for (quantity, size) in feature.sizes() {
+        let (value, std) = match quantity {
+            InspectedQuantity::Diameter => (&mut message.diameter, &mut message.diameter_std),
+            InspectedQuantity::Length => (&mut message.length, &mut message.length_std),
+            InspectedQuantity::Width => (&mut message.width, &mut message.width_std),
+            InspectedQuantity::Depth => (&mut message.depth, &mut message.depth_std),
+            _ => (&mut message.cone_angle, &mut message.cone_angle_std),
+        };
+        (*value, *std) = (size.value, size.std.unwrap_or(f64::NAN));
     }
+    message
 }
 
 /// How far a feature is off its ideal form.
 fn form_deviations(form: &Form) -> Vec<FormDeviation> {
-    let (deviations, coverage, undulations, lobes) = match form {
-        Form::Round(round) => (
-            vec![
-                (FormDeviation::ROUNDNESS, Some(round.roundness)),
-                (FormDeviation::CYLINDRICITY, round.cylindricity),
-                (FormDeviation::STRAIGHTNESS, round.straightness),
-            ],
-            round.coverage,
-            round.undulations,
-            round.lobes.clone(),
-        ),
-        Form::Flat(flat) => (
-            vec![(FormDeviation::FLATNESS, Some(flat.flatness))],
-            flat.coverage,
-            0,
-            Vec::new(),
-        ),
-    };
-    let message = |(characteristic, deviation): (u8, Option<Deviation>)| {
-        let deviation = deviation?;
-        Some(FormDeviation {
-            characteristic,
+    let round = form.round();
+    form.deviations()
+        .map(|(quantity, deviation)| FormDeviation {
+            characteristic: match quantity {
+                InspectedQuantity::Roundness => FormDeviation::ROUNDNESS,
+                InspectedQuantity::Cylindricity => FormDeviation::CYLINDRICITY,
+                InspectedQuantity::Straightness => FormDeviation::STRAIGHTNESS,
+                _ => FormDeviation::FLATNESS,
+            },
             zone: deviation.minimum_zone.value,
             zone_std: deviation.minimum_zone.std,
             least_squares: deviation.least_squares.value,
-            coverage,
-            undulations,
-            lobes: lobes.clone(),
+            coverage: form.coverage(),
+            undulations: round.map_or(0, |round| round.undulations),
+            lobes: round.map_or_else(Vec::new, |round| round.lobes.clone()),
         })
-    };
-    deviations.into_iter().filter_map(message).collect()
+        .collect()
 }
 
 /// How a feature lies to another.
@@ -162,12 +135,7 @@ pub fn related(relation: &Relation, name_of: impl Fn(u32) -> u32) -> RelationMsg
         relation.distance,
         relation.concentricity,
     ]
-    .map(|estimate| {
-        estimate.unwrap_or(Estimate {
-            value: f64::NAN,
-            std: f64::NAN,
-        })
-    });
+    .map(|estimate| estimate.map_or([f64::NAN; 2], |known| [known.value, known.std]));
     RelationMsg {
         kind: match relation.kind {
             RelationKind::Perpendicularity => RelationMsg::PERPENDICULARITY,
@@ -177,14 +145,14 @@ pub fn related(relation: &Relation, name_of: impl Fn(u32) -> u32) -> RelationMsg
         },
         of_feature: name_of(relation.of),
         to_feature: name_of(relation.to),
-        zone: zone.value,
-        zone_std: zone.std,
-        angle: angle.value,
-        angle_std: angle.std,
-        distance: distance.value,
-        distance_std: distance.std,
-        concentricity: concentricity.value,
-        concentricity_std: concentricity.std,
+        zone: zone[0],
+        zone_std: zone[1],
+        angle: angle[0],
+        angle_std: angle[1],
+        distance: distance[0],
+        distance_std: distance[1],
+        concentricity: concentricity[0],
+        concentricity_std: concentricity[1],
     }
 }
 
@@ -410,7 +378,7 @@ fn cylinder(feature: &FeatureMsg, base: &Marker) -> Marker {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::form::RoundForm;
+    use crate::form::{Deviation, Estimate, RoundForm};
 
     #[test]
     fn form_is_a_list_of_the_deviations_that_are_known() {

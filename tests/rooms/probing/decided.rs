@@ -9,13 +9,12 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
 use touchup::conformity::{
-    Decision, DecisionParams, InspectedQuantity, MeasuredNumber, ToleranceLimits, assess,
-    measured_number,
+    Decision, DecisionParams, MeasuredNumber, ToleranceLimits, assess, measured_number,
 };
-use touchup::features::Kind;
 use touchup::features::fit::{
     Cylinder, Ends, FitParams, Freedom, Observation, Plane, Stadium, Surface, fit,
 };
+use touchup::features::{InspectedQuantity, Kind};
 use touchup::probing::plan::{
     ArmUncertainty, DecisionGoal, Explorer, Found, PatternParams, Quantity, SoughtCharacteristic,
 };

@@ -16,7 +16,6 @@ mod matching;
 mod of_feature;
 mod place;
 mod probability;
-mod quantity;
 mod repeated;
 
 pub use assess::{
@@ -25,7 +24,6 @@ pub use assess::{
 pub use general::GeneralTolerance;
 pub use matching::{FeatureMatch, FeaturePlace, SoughtFeature, match_features};
 pub use of_feature::measured_number;
-pub use place::{coordinate_std, position};
+pub use place::place_number;
 pub use probability::{Distribution, ToleranceLimits, conformance_probability};
-pub use quantity::InspectedQuantity;
 pub use repeated::repeated_confidence;

@@ -1,11 +1,10 @@
 //! The measured value of a characteristic of a feature.
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Point3;
 
 use super::assess::MeasuredNumber;
-use super::place::{coordinate_std, position};
-use super::quantity::InspectedQuantity;
-use crate::features::{Feature, Measured};
+use super::place::place_number;
+use crate::features::{Feature, InspectedQuantity};
 
 /// The measured value of a quantity of a feature, m; `None` if it has none. Only sizes and places
 /// are such quantities.
@@ -16,40 +15,24 @@ pub fn measured_number(
     quantity: InspectedQuantity,
     nominal: Option<&Point3<f64>>,
 ) -> Option<MeasuredNumber> {
-    let size = |size: &Option<Measured<f64>>| {
-        let size = size.as_ref()?;
-        Some(MeasuredNumber {
+    if quantity.is_linear_size() {
+        let (_, size) = feature.sizes().find(|(own, _)| *own == quantity)?;
+        return Some(MeasuredNumber {
             value: size.value,
             std: size.std,
             is_at_least: size.is_at_least,
-        })
-    };
-    let axis = feature.axis.as_ref().map(|axis| axis.value);
-    let (centre, std) = (&feature.centre.value, feature.centre.std);
-    match quantity {
-        InspectedQuantity::Diameter => size(&feature.diameter),
-        InspectedQuantity::Width => size(&feature.width),
-        InspectedQuantity::Length => size(&feature.length),
-        InspectedQuantity::Depth => size(&feature.depth),
-        InspectedQuantity::X | InspectedQuantity::Y | InspectedQuantity::Z => {
-            let at = quantity as usize - InspectedQuantity::X as usize;
-            let std =
-                std.and_then(|std| coordinate_std(feature.kind, axis, std, &Vector3::ith(at, 1.0)));
-            Some(MeasuredNumber {
-                value: centre[at],
-                std,
-                is_at_least: false,
-            })
-        }
-        InspectedQuantity::Position => position(feature.kind, centre, axis, std, nominal?),
-        _ => None,
+        });
     }
+    let axis = feature.axis.as_ref().map(|axis| axis.value);
+    place_number(quantity, feature.kind, &feature.centre, axis, nominal)
 }
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::Vector3;
+
     use super::*;
-    use crate::features::Kind;
+    use crate::features::{Kind, Measured};
 
     #[test]
     fn sizes_and_coordinates_are_those_of_the_feature() {

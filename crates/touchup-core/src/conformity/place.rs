@@ -3,13 +3,41 @@
 use nalgebra::{Point3, Vector3};
 
 use super::assess::MeasuredNumber;
-use crate::features::Kind;
+use crate::features::{InspectedQuantity, Kind, Measured};
 
 /// Cosine of 5°: a direction within that counts as along or square to an axis, as in relations of
 /// features.
 const ALONG: f64 = 0.996_194_698_091_745_5;
 /// Sine of 5°.
 const SQUARE: f64 = 0.087_155_742_747_658_17;
+
+/// Coordinate or position of a centre; `None` for any other quantity, and for a position without an
+/// axis or nominal centre. Centre, nominal centre and number are in one unit.
+pub fn place_number(
+    quantity: InspectedQuantity,
+    kind: Kind,
+    centre: &Measured<Point3<f64>>,
+    axis: Option<Vector3<f64>>,
+    nominal: Option<&Point3<f64>>,
+) -> Option<MeasuredNumber> {
+    let at = match quantity {
+        InspectedQuantity::X => 0,
+        InspectedQuantity::Y => 1,
+        InspectedQuantity::Z => 2,
+        InspectedQuantity::Position => {
+            return position(kind, &centre.value, axis, centre.std, nominal?);
+        }
+        _ => return None,
+    };
+    let direction = Vector3::ith(at, 1.0);
+    Some(MeasuredNumber {
+        value: centre.value[at],
+        std: centre
+            .std
+            .and_then(|std| coordinate_std(kind, axis, std, &direction)),
+        is_at_least: false,
+    })
+}
 
 /// Standard uncertainty of the coordinate of a centre along a direction.
 ///
@@ -20,7 +48,7 @@ const SQUARE: f64 = 0.087_155_742_747_658_17;
 /// - `std`: of the centre.
 /// - `direction`: unit vector.
 /// - returns: `None` if the uncertainty of the centre does not cover that direction.
-pub fn coordinate_std(
+fn coordinate_std(
     kind: Kind,
     axis: Option<Vector3<f64>>,
     std: f64,
@@ -41,7 +69,7 @@ pub fn coordinate_std(
 ///
 /// - `centre`, `nominal`: in one unit, which the result has too; `std` of the centre as well.
 /// - returns: `None` without an axis to measure across.
-pub fn position(
+fn position(
     kind: Kind,
     centre: &Point3<f64>,
     axis: Option<Vector3<f64>>,

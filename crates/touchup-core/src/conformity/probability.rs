@@ -1,5 +1,6 @@
 //! The probability that a characteristic conforms.
 
+use crate::features::InspectedQuantity;
 use crate::numeric::{circle_probability, normal_cdf};
 
 /// Tolerance limits, both included; `None`: no limit on that side.
@@ -52,6 +53,17 @@ pub enum Distribution {
     /// distribution of the point in the plane: the diameter of a zone of position. The standard
     /// uncertainty is twice that of one coordinate.
     Position,
+}
+
+impl InspectedQuantity {
+    /// Distribution of the measurand about a measured value.
+    pub fn distribution(self) -> Distribution {
+        match self {
+            Self::Position => Distribution::Position,
+            _ if self.is_zone() => Distribution::NonNegative,
+            _ => Distribution::Normal,
+        }
+    }
 }
 
 /// Probability p_c that the measurand is within the limits.

@@ -190,8 +190,10 @@ fn is_on(feature: &Feature, touch: &ProbedPoint) -> bool {
 impl Feature {
     /// Fits the feature to its touches and the new ones; returns whether that held.
     fn take(&mut self, new: &[u32], touches: &[ProbedPoint]) -> bool {
-        let sized = self.diameter.as_ref().or(self.width.as_ref());
-        let known = sized.into_iter().flat_map(|sized| &sized.touches);
+        let known = self
+            .main_size()
+            .into_iter()
+            .flat_map(|sized| &sized.touches);
         let all = distinct(known.chain(new).copied());
         let step = all.len().div_ceil(MOST_FITTED).max(1);
         let fitted: Vec<u32> = all.iter().copied().rev().step_by(step).collect();

@@ -14,6 +14,7 @@ use touchup_core::compare::{
     CompareError, DisplacedFrom, Displacement, IndexedMesh, angle_between, displacements_by_vertex,
     displacements_to_surface,
 };
+use touchup_core::features::InspectedQuantity;
 use touchup_core::mesh::{FaceTree, TriMesh};
 use touchup_io::features_file::{FeatureRecord, read_features};
 use touchup_io::mesh_file::{MeshFile, MeshFileError, read_mesh, read_vertex_columns};
@@ -303,17 +304,6 @@ fn change(a: Option<&FeatureRecord>, b: Option<&FeatureRecord>, k: f64) -> Featu
     }
 }
 
-/// The number of a feature by its name.
-type NumberOf = fn(&FeatureRecord) -> Option<f64>;
-
-const NUMBERS: [(&str, NumberOf); 5] = [
-    ("diameter_mm", |one| one.diameter_mm),
-    ("length_mm", |one| one.length_mm),
-    ("width_mm", |one| one.width_mm),
-    ("depth_mm", |one| one.depth_mm),
-    ("cone_angle_deg", |one| one.cone_angle_deg),
-];
-
 fn numbers(a: &FeatureRecord, b: &FeatureRecord, k: f64) -> Vec<NumberChange> {
     let changed = |name: &'static str, values: [Option<f64>; 2], change: f64| {
         let stds = [a, b].map(|one| one.std.get(name).copied());
@@ -352,9 +342,9 @@ fn numbers(a: &FeatureRecord, b: &FeatureRecord, k: f64) -> Vec<NumberChange> {
             angle.min(std::f64::consts::PI - angle).to_degrees(),
         )
     });
-    let sizes = NUMBERS.iter().filter_map(|&(name, of)| {
-        let (x, y) = of(a).zip(of(b))?;
-        Some(changed(name, [Some(x), Some(y)], y - x))
+    let sizes = InspectedQuantity::SIZES.iter().filter_map(|quantity| {
+        let [x, y] = [a.number(*quantity)?.value, b.number(*quantity)?.value];
+        Some(changed(quantity.name(), [Some(x), Some(y)], y - x))
     });
     place.into_iter().chain(axis).chain(sizes).collect()
 }

@@ -57,7 +57,6 @@ pub(super) fn landmarks(
 impl Landmark {
     fn of(feature: &Feature, planes: &[(Point3<f64>, Vector3<f64>)], near: f64) -> Self {
         let place = feature.centre.value;
-        let size = feature.diameter.as_ref().or(feature.width.as_ref());
         let reach = match feature.kind {
             Kind::Edge => feature
                 .length
@@ -70,7 +69,9 @@ impl Landmark {
             place,
             axis: feature.axis.as_ref().map(|axis| axis.value),
             direction: feature.direction,
-            size: size.map(|size| [size.value, size.std.unwrap_or(0.0)]),
+            size: feature
+                .main_size()
+                .map(|size| [size.value, size.std.unwrap_or(0.0)]),
             sigma: feature.centre.std.unwrap_or(0.0),
             span: reach,
             is_through: feature.through == Some(true),

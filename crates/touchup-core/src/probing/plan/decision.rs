@@ -10,10 +10,10 @@ use nalgebra::Point3;
 
 use super::search_context::OpenNumbers;
 use crate::conformity::{
-    Assessment, Decision, DecisionParams, InspectedQuantity, MeasuredNumber, ToleranceLimits,
-    assess, measured_number, repeated_confidence,
+    Assessment, Decision, DecisionParams, MeasuredNumber, ToleranceLimits, assess, measured_number,
+    repeated_confidence,
 };
-use crate::features::{Feature, Kind};
+use crate::features::{Feature, InspectedQuantity, Kind};
 use crate::numeric::normal_quantile;
 
 /// A characteristic to decide.

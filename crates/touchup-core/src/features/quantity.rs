@@ -1,7 +1,8 @@
 //! Measured quantities of features.
 
-use super::probability::Distribution;
-use crate::features::Kind;
+use serde::{Serialize, Serializer};
+
+use super::feature::Kind;
 use crate::names;
 
 names! {
@@ -50,7 +51,30 @@ names! {
     }
 }
 
+impl Serialize for InspectedQuantity {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.name())
+    }
+}
+
 impl InspectedQuantity {
+    /// Sizes of a feature, in the order of its file.
+    pub const SIZES: [Self; 5] = [
+        Self::Diameter,
+        Self::Length,
+        Self::Width,
+        Self::Depth,
+        Self::ConeAngle,
+    ];
+
+    /// A value in m or rad, in the unit of the name.
+    pub fn from_si(self, value: f64) -> f64 {
+        match self.unit() {
+            "deg" => value.to_degrees(),
+            _ => value * 1e3,
+        }
+    }
+
     /// Name and unit apart: `diameter`, `mm`.
     pub fn parts(self) -> (&'static str, &'static str) {
         self.name().rsplit_once('_').unwrap_or((self.name(), ""))
@@ -64,7 +88,18 @@ impl InspectedQuantity {
     /// Whether it is a width of 0 at best: its tolerance is an upper limit alone, and its nominal
     /// value is 0.
     pub fn is_zone(self) -> bool {
-        self.distribution() != Distribution::Normal
+        matches!(
+            self,
+            Self::Position
+                | Self::Roundness
+                | Self::Cylindricity
+                | Self::Straightness
+                | Self::Flatness
+                | Self::Perpendicularity
+                | Self::Parallelism
+                | Self::Coaxiality
+                | Self::Concentricity
+        )
     }
 
     /// Whether it relates the feature to another one.
@@ -107,22 +142,6 @@ impl InspectedQuantity {
             self,
             Self::Diameter | Self::Width | Self::Length | Self::Depth | Self::Distance
         )
-    }
-
-    /// Distribution of the measurand about a measured value.
-    pub fn distribution(self) -> Distribution {
-        match self {
-            Self::Position => Distribution::Position,
-            Self::Roundness
-            | Self::Cylindricity
-            | Self::Straightness
-            | Self::Flatness
-            | Self::Perpendicularity
-            | Self::Parallelism
-            | Self::Coaxiality
-            | Self::Concentricity => Distribution::NonNegative,
-            _ => Distribution::Normal,
-        }
     }
 }
 
