@@ -7,6 +7,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::file_error::{FileError, write_file};
+use super::result_table::cell_text;
 
 /// A whole inspection.
 #[derive(Clone, Debug, Default, Serialize)]
@@ -198,35 +199,6 @@ impl CharacteristicRecord {
                 .insert(format!("{name}_{}", self.unit()), number);
         }
     }
-
-    fn fields(&self, units: &[&str], frame: &str) -> Vec<String> {
-        let text = |number: Option<f64>| number.map_or(String::new(), |number| number.to_string());
-        let id = |id: Option<u32>| id.map_or(String::new(), |id| id.to_string());
-        let mut fields = vec![
-            self.number.clone(),
-            self.name.clone(),
-            self.kind.clone(),
-            id(self.feature),
-            id(self.datum),
-            self.quantity.clone(),
-        ];
-        let numbers = units
-            .iter()
-            .flat_map(|unit| NUMBERS.map(|name| self.numbers.get(&format!("{name}_{unit}"))));
-        fields.extend(numbers.map(|number| text(number.copied())));
-        fields.extend([
-            u8::from(self.is_at_least).to_string(),
-            self.tolerance_from.clone(),
-            self.decision.clone(),
-            text(self.conformance_probability),
-            text(self.risk),
-            self.touches.to_string(),
-            self.fitted_to.clone(),
-            self.reason.clone().unwrap_or_default(),
-            frame.to_owned(),
-        ]);
-        fields
-    }
 }
 
 const BEFORE: [&str; 6] = ["number", "name", "kind", "feature", "datum", "quantity"];
@@ -261,7 +233,7 @@ pub fn write_inspection_table(
     let numbers = units
         .iter()
         .flat_map(|unit| NUMBERS.map(|name| format!("{name}_{unit}")));
-    let header: Vec<String> = BEFORE
+    let columns: Vec<String> = BEFORE
         .map(str::to_owned)
         .into_iter()
         .chain(numbers)
@@ -269,9 +241,12 @@ pub fn write_inspection_table(
         .collect();
     write_file(path, |out| {
         let mut rows = csv::Writer::from_writer(out);
-        rows.write_record(&header)?;
+        rows.write_record(&columns)?;
         for one in characteristics {
-            rows.write_record(one.fields(&units, frame))?;
+            let mut row = serde_json::to_value(one)?;
+            row["is_at_least"] = u8::from(one.is_at_least).into();
+            row["frame"] = frame.into();
+            rows.write_record(columns.iter().map(|column| cell_text(row.get(column))))?;
         }
         rows.flush()
     })

@@ -236,6 +236,13 @@ fn text_of(cell: Option<&Cell>) -> String {
     }
 }
 
+/// A value of a record as text of a table: a number without exponent, `null` empty.
+pub(crate) fn cell_text(value: Option<&Value>) -> String {
+    let mut cells = Vec::new();
+    flatten("", value.unwrap_or(&Value::Null), &mut cells);
+    text_of(cells.first().map(|(_, cell)| cell))
+}
+
 fn touch_cell(name: &str, value: &str) -> Cell {
     let count = || value.parse().map(Cell::Count).ok();
     let number = || value.parse().map(Cell::Number).ok();

@@ -6,33 +6,34 @@ use std::path::Path;
 use super::error::NominalFileError;
 use super::record::{DatumRecord, NominalRecord};
 use crate::file_error::{FileError, write_file};
+use crate::result_table::cell_text;
 use crate::table::{Row, TableError, WantedColumns, read_table};
 
 /// The columns, in any order; columns without a value in any row are optional.
-const COLUMNS: [&str; 23] = [
-    "name",
-    "kind",
-    "quantity",
-    "nominal_mm",
-    "tolerance_mm",
-    "lower_deviation_mm",
-    "upper_deviation_mm",
-    "nominal_deg",
-    "tolerance_deg",
-    "lower_deviation_deg",
-    "upper_deviation_deg",
-    "center_x_mm",
-    "center_y_mm",
-    "center_z_mm",
-    "axis_x",
-    "axis_y",
-    "axis_z",
-    "feature",
-    "datum_kind",
-    "datum_x_mm",
-    "datum_y_mm",
-    "datum_z_mm",
-    "datum_feature",
+const COLUMNS: [(&str, &str); 23] = [
+    ("name", "/name"),
+    ("kind", "/kind"),
+    ("quantity", "/quantity"),
+    ("nominal_mm", "/nominal_mm"),
+    ("tolerance_mm", "/tolerance_mm"),
+    ("lower_deviation_mm", "/lower_deviation_mm"),
+    ("upper_deviation_mm", "/upper_deviation_mm"),
+    ("nominal_deg", "/nominal_deg"),
+    ("tolerance_deg", "/tolerance_deg"),
+    ("lower_deviation_deg", "/lower_deviation_deg"),
+    ("upper_deviation_deg", "/upper_deviation_deg"),
+    ("center_x_mm", "/center_mm/0"),
+    ("center_y_mm", "/center_mm/1"),
+    ("center_z_mm", "/center_mm/2"),
+    ("axis_x", "/axis/0"),
+    ("axis_y", "/axis/1"),
+    ("axis_z", "/axis/2"),
+    ("feature", "/feature"),
+    ("datum_kind", "/datum/kind"),
+    ("datum_x_mm", "/datum/center_mm/0"),
+    ("datum_y_mm", "/datum/center_mm/1"),
+    ("datum_z_mm", "/datum/center_mm/2"),
+    ("datum_feature", "/datum/feature"),
 ];
 
 /// Number of required columns.
@@ -49,7 +50,7 @@ const TEXTS: [&str; 6] = [
 ];
 
 pub(super) fn read(path: &Path) -> Result<Vec<(String, NominalRecord)>, NominalFileError> {
-    let mut numbers = COLUMNS.to_vec();
+    let mut numbers = COLUMNS.map(|(column, _)| column).to_vec();
     numbers.retain(|column| !TEXTS.contains(column));
     let columns = WantedColumns {
         needed: &[],
@@ -110,9 +111,9 @@ fn record_of(row: &Row, numbers: &[&str]) -> Result<NominalRecord, String> {
         }
     };
     Ok(NominalRecord {
-        name: needed(COLUMNS[0])?,
-        kind: needed(COLUMNS[1])?,
-        quantity: needed(COLUMNS[NEEDED - 1])?,
+        name: needed("name")?,
+        kind: needed("kind")?,
+        quantity: needed("quantity")?,
         nominal_mm: number("nominal_mm"),
         nominal_deg: number("nominal_deg"),
         tolerance_mm: number("tolerance_mm"),
@@ -146,7 +147,7 @@ pub(super) fn write(
         let mut rows_out = csv::WriterBuilder::new()
             .comment(Some(b'#'))
             .from_writer(out);
-        rows_out.write_record(used.iter().map(|&column| COLUMNS[column]))?;
+        rows_out.write_record(used.iter().map(|&column| COLUMNS[column].0))?;
         for row in &rows {
             rows_out.write_record(used.iter().map(|&column| &row[column]))?;
         }
@@ -155,38 +156,6 @@ pub(super) fn write(
 }
 
 fn fields_of(record: &NominalRecord) -> [String; 23] {
-    let shown = |number: Option<f64>| number.map_or(String::new(), |number| number.to_string());
-    let place = |center: Option<[f64; 3]>| {
-        center.map_or_else(Default::default, |center| center.map(|x| x.to_string()))
-    };
-    let whole = |id: Option<u32>| id.map_or(String::new(), |id| id.to_string());
-    let datum = record.datum.clone().unwrap_or_default();
-    let [x, y, z] = place(record.center_mm);
-    let [a, b, c] = place(record.axis);
-    let [u, v, w] = place(datum.center_mm);
-    [
-        record.name.clone(),
-        record.kind.clone(),
-        record.quantity.clone(),
-        shown(record.nominal_mm),
-        shown(record.tolerance_mm),
-        shown(record.lower_deviation_mm),
-        shown(record.upper_deviation_mm),
-        shown(record.nominal_deg),
-        shown(record.tolerance_deg),
-        shown(record.lower_deviation_deg),
-        shown(record.upper_deviation_deg),
-        x,
-        y,
-        z,
-        a,
-        b,
-        c,
-        whole(record.feature),
-        datum.kind,
-        u,
-        v,
-        w,
-        whole(datum.feature),
-    ]
+    let value = serde_json::to_value(record).expect("names and finite numbers alone cannot fail");
+    COLUMNS.map(|(_, place)| cell_text(value.pointer(place)))
 }
