@@ -14,13 +14,12 @@ use serde::Serialize;
 use super::arm_errors::ArmErrorsName;
 use super::check::{CheckReport, Gates, SPOT_TOUCHES, touched};
 use super::compare::{CompareArguments, compared};
-use super::found::kind_of;
 use super::probing::{Done, Probing, ProbingSummary, Ready};
 use super::progress::WorkProgress;
 use super::signals::StopSignals;
 use super::{CliError, Losses, not_written, print_result, reported, write_json};
 use crate::calibrate::ReferenceSphere;
-use crate::features::{Feature, Measured};
+use crate::features::{Feature, InspectedQuantity};
 use crate::io::atomic::{create_folder, write_atomically};
 use crate::io::features_file::FeatureRecord;
 use crate::io::mesh_file::{MeshUnit, write_mesh};
@@ -240,7 +239,7 @@ fn clicked(id: u32, feature: &TruthFeature, rng: &mut Pcg64) -> Flag {
         feature.centre + Vector3::new(off * angle.cos(), off * angle.sin(), top);
     Flag {
         id,
-        kind: Some(kind_of(&feature.shape)),
+        kind: Some(feature.kind()),
         place,
         radius: CLICK,
     }
@@ -250,12 +249,8 @@ fn clicked(id: u32, feature: &TruthFeature, rng: &mut Pcg64) -> Flag {
 /// its edge.
 fn place_error(found: &Feature, truth: &TruthFeature) -> f64 {
     let off = found.centre.value - truth.centre;
-    let along = match truth.shape {
-        // the touched position along the edge is no error
-        TruthShape::Step { direction, .. } => direction,
-        // features of the plate are perpendicular to its top
-        _ => Vector3::z(),
-    };
+    // where along it the edge was touched is no error
+    let along = truth.direction();
     (off - along * off.dot(&along)).norm()
 }
 
@@ -277,35 +272,22 @@ fn numbers(found: Option<&Feature>, truth: &TruthFeature) -> Vec<NumberError> {
     let Some(found) = found else {
         return Vec::new();
     };
-    let number = |number, measured: &Option<Measured<f64>>, size: f64| {
-        let value = measured
-            .as_ref()
-            .map_or(f64::NAN, |measured| measured.value);
-        let std = measured
-            .as_ref()
-            .and_then(|measured| measured.std)
-            .unwrap_or(f64::NAN);
+    let number = |(quantity, size): (InspectedQuantity, f64)| {
+        let measured = found.sizes().find(|(own, _)| *own == quantity);
+        let value = measured.map_or(f64::NAN, |(_, measured)| measured.value);
+        let std = measured.and_then(|(_, measured)| measured.std);
         let (true_mm, found_mm) = (Some(size * 1e3), Some(value * 1e3));
         NumberError {
-            number,
+            number: quantity.parts().0,
             true_mm,
             found_mm,
             error_mm: (value - size) * 1e3,
-            expanded_mm: COVERAGE * std * 1e3,
+            expanded_mm: COVERAGE * std.unwrap_or(f64::NAN) * 1e3,
         }
     };
-    match truth.shape {
-        TruthShape::Hole { diameter, .. } | TruthShape::Boss { diameter, .. } => {
-            vec![number("diameter", &found.diameter, diameter)]
-        }
-        TruthShape::Slot { width, length, .. } => {
-            vec![
-                number("width", &found.width, width),
-                number("length", &found.length, length),
-            ]
-        }
-        TruthShape::Step { .. } => Vec::new(),
-    }
+    let mut sizes = truth.sizes();
+    sizes.retain(|(quantity, _)| *quantity != InspectedQuantity::Depth);
+    sizes.into_iter().map(number).collect()
 }
 
 impl fmt::Display for RobotSummary {

@@ -6,9 +6,9 @@ use nalgebra::{Point3, Vector3};
 use serde::Serialize;
 
 use super::reported;
-use crate::features::{InspectedQuantity, Kind};
+use crate::features::InspectedQuantity;
 use crate::io::features_file::FeatureRecord;
-use crate::sim::{TruthFeature, TruthShape};
+use crate::sim::TruthFeature;
 
 reported! {
     /// True feature and its detection; lengths in mm, angles in degrees.
@@ -69,7 +69,7 @@ impl FoundTable {
 
 /// Nearest found feature of the same kind, if any.
 fn nearest<'a>(truth: &TruthFeature, found: &'a [FeatureRecord]) -> Option<&'a FeatureRecord> {
-    let kind = kind_of(&truth.shape).name();
+    let kind = truth.kind().name();
     let off = |record: &&FeatureRecord| off_mm(truth, record).unwrap_or(f64::INFINITY);
     let of_kind = found.iter().filter(|record| record.kind == kind);
     of_kind
@@ -89,63 +89,20 @@ fn numbers(truth: &TruthFeature, record: Option<&FeatureRecord>) -> Vec<FoundNum
             is_lower_bound: found.is_some_and(|found| found.is_at_least),
         }
     };
-    let diameter = |d| number(InspectedQuantity::Diameter, d);
-    let depth = |d| number(InspectedQuantity::Depth, d);
-    match truth.shape {
-        TruthShape::Hole {
-            diameter: d,
-            through: true,
-            ..
-        } => vec![diameter(d)],
-        TruthShape::Hole {
-            diameter: d,
-            depth: h,
-            ..
-        } => vec![diameter(d), depth(h)],
-        TruthShape::Slot {
-            width,
-            length,
-            depth: h,
-            ..
-        } => vec![
-            number(InspectedQuantity::Width, width),
-            number(InspectedQuantity::Length, length),
-            depth(h),
-        ],
-        TruthShape::Boss {
-            diameter: d,
-            height,
-        } => vec![diameter(d), depth(height)],
-        TruthShape::Step { .. } => Vec::new(),
-    }
-}
-
-/// Detected kind of a true shape.
-pub(super) fn kind_of(shape: &TruthShape) -> Kind {
-    match shape {
-        TruthShape::Hole { .. } => Kind::Hole,
-        TruthShape::Slot { .. } => Kind::Slot,
-        TruthShape::Boss { .. } => Kind::Boss,
-        TruthShape::Step { .. } => Kind::Edge,
-    }
-}
-
-/// Common direction of both.
-fn axis_of(truth: &TruthFeature) -> Vector3<f64> {
-    match truth.shape {
-        TruthShape::Step { direction, .. } => direction,
-        _ => truth.axis,
-    }
+    let sizes = truth.sizes().into_iter();
+    sizes
+        .map(|(quantity, size)| number(quantity, size))
+        .collect()
 }
 
 /// Distance across the axis, mm.
 fn off_mm(truth: &TruthFeature, record: &FeatureRecord) -> Option<f64> {
     let off = Point3::from(record.center_mm?) - truth.centre * 1e3;
-    Some(off.cross(&axis_of(truth)).norm())
+    Some(off.cross(&truth.direction()).norm())
 }
 
 fn axis_off_deg(truth: &TruthFeature, record: &FeatureRecord) -> Option<f64> {
-    let (axis, truth) = (Vector3::from(record.axis?), axis_of(truth));
+    let (axis, truth) = (Vector3::from(record.axis?), truth.direction());
     Some(
         axis.cross(&truth)
             .norm()

@@ -8,6 +8,7 @@
 use nalgebra::{Point2, Point3, Vector2, Vector3};
 
 use super::surface::{Bounds, Surface, SurfacePoint};
+use touchup_core::features::{InspectedQuantity, Kind};
 
 /// All points within `radius` of a segment; a disc when the segment has no length.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -117,6 +118,49 @@ pub struct TruthFeature {
     pub axis: Vector3<f64>,
     /// kind and sizes
     pub shape: TruthShape,
+}
+
+impl TruthFeature {
+    /// The kind that it is found as.
+    pub fn kind(&self) -> Kind {
+        match self.shape {
+            TruthShape::Hole { .. } => Kind::Hole,
+            TruthShape::Slot { .. } => Kind::Slot,
+            TruthShape::Boss { .. } => Kind::Boss,
+            TruthShape::Step { .. } => Kind::Edge,
+        }
+    }
+
+    /// Sizes on a drawing, m: of a through hole without its depth, of a step none.
+    pub fn sizes(&self) -> Vec<(InspectedQuantity, f64)> {
+        use InspectedQuantity::{Depth, Diameter, Length, Width};
+        match self.shape {
+            TruthShape::Hole {
+                diameter,
+                through: true,
+                ..
+            } => vec![(Diameter, diameter)],
+            TruthShape::Hole {
+                diameter, depth, ..
+            } => vec![(Diameter, diameter), (Depth, depth)],
+            TruthShape::Slot {
+                width,
+                length,
+                depth,
+                ..
+            } => vec![(Width, width), (Length, length), (Depth, depth)],
+            TruthShape::Boss { diameter, height } => vec![(Diameter, diameter), (Depth, height)],
+            TruthShape::Step { .. } => Vec::new(),
+        }
+    }
+
+    /// Direction of the axis, of a step along its edge.
+    pub fn direction(&self) -> Vector3<f64> {
+        match self.shape {
+            TruthShape::Step { direction, .. } => direction,
+            _ => self.axis,
+        }
+    }
 }
 
 /// The plate: 80 × 50 × 12 mm with a through-hole, a blind hole, a slot, a step and a boss.

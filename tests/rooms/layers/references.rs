@@ -208,7 +208,7 @@ const BREACHES: &[(&str, &str)] = &[
     ),
     (
         "crates/touchup-sim/src/arm.rs",
-        "use touchup_core::{mesh::TriMesh, features::Kind};",
+        "use touchup_core::{mesh::TriMesh, align::Motion};",
     ),
     (
         "crates/touchup-session/src/scene/mod.rs",

@@ -20,7 +20,7 @@ pub const MAY_USE: &[(&str, &str)] = &[
         "execute",
         "numeric parameters stylus mesh features calibrate plan arm",
     ),
-    ("sim", "numeric stylus mesh calibrate diagnose arm"),
+    ("sim", "numeric stylus mesh features calibrate diagnose arm"),
     ("form", "numeric"),
     ("features", "numeric stylus mesh form"),
     ("conformity", "numeric features"),

@@ -4,7 +4,7 @@ use nalgebra::{Point3, Vector2, Vector3};
 
 use super::kind::CoverageKind;
 use super::stated::StatedNumber;
-use touchup_core::features::{Feature, FittedTo, Kind, Measured};
+use touchup_core::features::{Feature, FittedTo, InspectedQuantity, Kind, Measured};
 use touchup_core::reconstruct::Support;
 use touchup_sim::{Plate, Surface, SurfacePoint, TruthFeature, TruthShape};
 
@@ -134,48 +134,28 @@ fn of_walls(feature: &Feature, truth: &TruthFeature) -> Option<Vec<(CoverageKind
     if off.norm() > SAME || axis.dot(&truth.axis) < PARALLEL {
         return None;
     }
-    let (place, sizes) = match (feature.kind, truth.shape) {
-        (
-            Kind::Hole,
-            TruthShape::Hole {
-                diameter,
-                depth,
-                through,
-            },
-        ) => {
-            let depth = (!through).then_some((K::HoleDepth, &feature.depth, depth));
-            (
-                K::HolePosition,
-                vec![Some((K::HoleDiameter, &feature.diameter, diameter)), depth],
-            )
-        }
-        (
-            Kind::Slot,
-            TruthShape::Slot {
-                width,
-                length,
-                depth,
-                ..
-            },
-        ) => {
-            let sizes = [
-                (K::SlotWidth, &feature.width, width),
-                (K::SlotLength, &feature.length, length),
-                (K::SlotDepth, &feature.depth, depth),
-            ];
-            (K::SlotPosition, sizes.map(Some).to_vec())
-        }
-        (Kind::Boss, TruthShape::Boss { diameter, height }) => {
-            let sizes = [
-                (K::BossDiameter, &feature.diameter, diameter),
-                (K::BossHeight, &feature.depth, height),
-            ];
-            (K::BossPosition, sizes.map(Some).to_vec())
-        }
-        _ => return None,
+    if feature.kind != truth.kind() {
+        return None;
+    }
+    let place = match feature.kind {
+        Kind::Hole => K::HolePosition,
+        Kind::Slot => K::SlotPosition,
+        _ => K::BossPosition,
     };
-    let sizes = sizes.into_iter().flatten();
-    let sizes = sizes.filter_map(|(kind, found, truth)| Some(stated(kind, found.as_ref()?, truth)));
+    let number = |(quantity, size): (InspectedQuantity, f64)| {
+        let (_, found) = feature.sizes().find(|(own, _)| *own == quantity)?;
+        let kind = match (feature.kind, quantity) {
+            (Kind::Hole, InspectedQuantity::Diameter) => K::HoleDiameter,
+            (Kind::Hole, _) => K::HoleDepth,
+            (Kind::Slot, InspectedQuantity::Width) => K::SlotWidth,
+            (Kind::Slot, InspectedQuantity::Length) => K::SlotLength,
+            (Kind::Slot, _) => K::SlotDepth,
+            (_, InspectedQuantity::Diameter) => K::BossDiameter,
+            _ => K::BossHeight,
+        };
+        Some(stated(kind, found, size))
+    };
+    let sizes = truth.sizes().into_iter().filter_map(number);
     Some(
         across(place, off, &feature.centre)
             .into_iter()
