@@ -59,9 +59,5 @@ pub(super) fn shape_of(record: &FeatureRecord) -> Option<Feature> {
 
 /// A number or place with its standard uncertainty.
 pub(super) fn measured<T: Default>(value: T, std: Option<f64>) -> Measured<T> {
-    Measured {
-        value,
-        std,
-        ..Measured::default()
-    }
+    Measured::new(value, std, Vec::new())
 }

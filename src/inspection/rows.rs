@@ -4,10 +4,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::time::SystemTime;
 
 use chrono::{DateTime, SecondsFormat, Utc};
-use nalgebra::{Point3, Vector3};
+use nalgebra::Point3;
 
 use super::alignment::{Alignment, aligned};
 use super::drawing::{Drawn, PartDrawing};
+use super::drawn_feature::shape_of;
 use super::measured::{CharacteristicMeasurement, is_of_mesh, measurement, missing_touches};
 use super::source::InspectionSource;
 use super::words::first_few;
@@ -16,7 +17,7 @@ use crate::conformity::{
     Assessment, Decision, FeatureMatch, FeaturePlace, SoughtFeature, ToleranceLimits, assess,
     match_features,
 };
-use crate::features::{InspectedQuantity, Kind};
+use crate::features::InspectedQuantity;
 use crate::io::features_file::{FeatureFile, FeatureRecord};
 use crate::io::inspection_file::{CharacteristicRecord, InspectionRecord};
 use crate::io::machine::VERSION;
@@ -148,7 +149,8 @@ fn match_all(
     file: &FeatureFile,
     reach: f64,
 ) -> DrawingMatches {
-    let places: Vec<_> = file.features.iter().filter_map(place_of).collect();
+    let shapes = file.features.iter().filter_map(shape_of);
+    let places: Vec<_> = shapes.map(|shape| FeaturePlace::of(&shape)).collect();
     let sought: Vec<_> = groups.iter().map(|group| sought_of(drawn, group)).collect();
     let features = match_features(&sought, &places, reach);
     let datum = |one: &Drawn| {
@@ -170,18 +172,6 @@ fn match_all(
 
 fn point(mm: [f64; 3]) -> Point3<f64> {
     Point3::from(mm) * 1e-3
-}
-
-fn place_of(feature: &FeatureRecord) -> Option<FeaturePlace> {
-    let size = feature.diameter_mm.or(feature.width_mm).map(|mm| mm * 1e-3);
-    let axis = feature.axis.map(Vector3::from);
-    Some(FeaturePlace {
-        id: feature.id,
-        kind: Kind::of_name(&feature.kind)?,
-        centre: point(feature.center_mm?),
-        axis,
-        size,
-    })
 }
 
 fn sought_of(drawn: &[Drawn], group: &[usize]) -> SoughtFeature {
@@ -208,7 +198,7 @@ fn found_feature<'a>(matched: &FeatureMatch, file: &'a FeatureFile) -> Option<&'
     let FeatureMatch::Found(id) = matched else {
         return None;
     };
-    file.features.iter().find(|feature| feature.id == *id)
+    file.feature(*id)
 }
 
 /// Why a feature of the drawing has none that was measured.

@@ -3,28 +3,33 @@
 use super::messages::*;
 use super::port::{ArmOrder, Arrival, Call, Goal, GoalEnd};
 
-/// A feature without any measurement.
+/// A direction without meaning.
+pub const NO_VECTOR: Vector3 = Vector3 {
+    x: f64::NAN,
+    y: f64::NAN,
+    z: f64::NAN,
+};
+
+/// A place without meaning.
+pub const NO_POINT: Point = Point {
+    x: f64::NAN,
+    y: f64::NAN,
+    z: f64::NAN,
+};
+
+/// A feature of which nothing is measured.
 pub fn unknown_feature(id: u32) -> Feature {
     let nan = f64::NAN;
-    let none = Vector3 {
-        x: nan,
-        y: nan,
-        z: nan,
-    };
     Feature {
         id,
         status: Feature::STATUS_FLAGGED,
         fitted_to: Feature::FITTED_TO_NOTHING,
         search_radius: nan,
-        center: Point {
-            x: nan,
-            y: nan,
-            z: nan,
-        },
+        center: NO_POINT,
         center_std: nan,
-        axis: none,
+        axis: NO_VECTOR,
         axis_std: nan,
-        direction: none,
+        direction: NO_VECTOR,
         diameter: nan,
         diameter_std: nan,
         length: nan,

@@ -67,8 +67,9 @@ reported! {
     /// noise may hide.
     #[derive(Clone, Deserialize)]
     pub struct FormRecord, fn of(form: &Form) {
-        /// `roundness_mm`, `cylindricity_mm`, `straightness_mm` (of the axis) of round walls,
-        /// `flatness_mm` of planes
+        /// round walls: `roundness_mm` of the mean section, `cylindricity_mm` if they were touched
+        /// at several heights, `straightness_mm` if they were touched at three heights all around
+        /// (diameter of the cylinder that holds the axis); planes: `flatness_mm`
         #[serde(flatten, deserialize_with = "known_numbers")]
         pub numbers: NumbersByQuantity = form
             .deviations()
@@ -314,6 +315,11 @@ impl FeatureFile {
             unexplained: Some(unexplained),
             clusters: Vec::new(),
         }
+    }
+
+    /// The feature of a number.
+    pub fn feature(&self, id: u32) -> Option<&FeatureRecord> {
+        self.features.iter().find(|feature| feature.id == id)
     }
 
     /// Clusters alone.

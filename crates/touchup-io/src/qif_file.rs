@@ -131,29 +131,18 @@ fn document(record: &InspectionRecord) -> String {
 }
 
 /// Name of the characteristic in QIF.
-fn name_of(one: &CharacteristicRecord) -> &'static str {
-    match InspectedQuantity::of_name(&one.quantity) {
-        Some(InspectedQuantity::Diameter) | None => "Diameter",
-        Some(InspectedQuantity::Width) => "Width",
-        Some(InspectedQuantity::Length) => "Length",
-        Some(InspectedQuantity::Depth) if one.kind == "boss" => "Height",
-        Some(InspectedQuantity::Depth) => "Depth",
-        Some(InspectedQuantity::ConeAngle) => "Angle",
-        Some(InspectedQuantity::X | InspectedQuantity::Y | InspectedQuantity::Z) => {
-            "LinearCoordinate"
-        }
-        Some(InspectedQuantity::Position) => "Position",
-        Some(InspectedQuantity::Roundness) => "Circularity",
-        Some(InspectedQuantity::Cylindricity) => "Cylindricity",
-        Some(InspectedQuantity::Straightness) => "Straightness",
-        Some(InspectedQuantity::Flatness) => "Flatness",
-        Some(InspectedQuantity::Perpendicularity) => "Perpendicularity",
-        Some(InspectedQuantity::Parallelism) => "Parallelism",
-        Some(InspectedQuantity::Coaxiality) => "Coaxiality",
-        Some(InspectedQuantity::Concentricity) => "Concentricity",
-        Some(InspectedQuantity::Distance) => "DistanceBetween",
-        Some(InspectedQuantity::Angle) => "AngleBetween",
+fn name_of(one: &CharacteristicRecord) -> String {
+    let quantity = InspectedQuantity::of_name(&one.quantity).unwrap_or(InspectedQuantity::Diameter);
+    match quantity {
+        InspectedQuantity::Depth if one.kind == "boss" => "Height",
+        InspectedQuantity::ConeAngle => "Angle",
+        InspectedQuantity::X | InspectedQuantity::Y | InspectedQuantity::Z => "LinearCoordinate",
+        InspectedQuantity::Roundness => "Circularity",
+        InspectedQuantity::Distance => "DistanceBetween",
+        InspectedQuantity::Angle => "AngleBetween",
+        _ => return format!("{quantity:?}"),
     }
+    .to_owned()
 }
 
 /// One element of an aspect.
@@ -169,7 +158,7 @@ fn definition(one: &CharacteristicRecord, ids: &Ids) -> String {
         let width = format!("<ToleranceValue>{}</ToleranceValue>", upper.unwrap_or(0.0));
         let round = "<ZoneShape><DiametricalZone/></ZoneShape>";
         let is_plane = one.kind == "plane";
-        let (material, shape) = match name_of(one) {
+        let (material, shape) = match &*name_of(one) {
             "Position" => ("<MaterialCondition>REGARDLESS</MaterialCondition>", round),
             "Perpendicularity" | "Parallelism" if is_plane => (
                 "<MaterialCondition>REGARDLESS</MaterialCondition>",

@@ -153,12 +153,13 @@ fn matched(
     motion: &Isometry3<f64>,
     reach: f64,
 ) -> Vec<Result<Matched, String>> {
-    let place = |feature: &Feature| FeaturePlace {
-        id: feature.id,
-        kind: feature.kind,
-        centre: motion * feature.centre.value,
-        axis: feature.axis.as_ref().map(|axis| motion * axis.value),
-        size: feature.main_size().map(|size| size.value),
+    let place = |feature: &Feature| {
+        let place = FeaturePlace::of(feature);
+        FeaturePlace {
+            centre: motion * place.centre,
+            axis: place.axis.map(|axis| motion * axis),
+            ..place
+        }
     };
     let places: Vec<_> = measured.iter().map(place).collect();
     let sought = |one: &DrawnFeature| SoughtFeature {

@@ -110,9 +110,7 @@ pub(super) fn form_and_relations(input: &ReportInput<'_>) -> String {
     };
     let mut forms = Vec::new();
     for one in &input.inspected.balloons {
-        let feature = one
-            .feature
-            .and_then(|id| file.features.iter().find(|feature| feature.id == id));
+        let feature = one.feature.and_then(|id| file.feature(id));
         let Some(form) = feature.and_then(|feature| feature.form.as_ref()) else {
             continue;
         };
@@ -130,8 +128,9 @@ pub(super) fn form_and_relations(input: &ReportInput<'_>) -> String {
         ]);
     }
     let name = |id: u32| {
-        let feature = file.features.iter().find(|feature| feature.id == id);
-        let kind = feature.map_or(String::new(), |feature| escaped(&feature.kind));
+        let kind = file
+            .feature(id)
+            .map_or(String::new(), |feature| escaped(&feature.kind));
         balloon(id).map_or_else(
             || format!("{kind}, id {id}"),
             |balloon| format!("{} · {kind}", balloon.number),

@@ -37,15 +37,8 @@ pub(super) fn touches(input: &ReportInput<'_>) -> String {
 
 #[expect(clippy::too_many_lines)]
 fn feature(input: &ReportInput<'_>, balloon: &Balloon) -> String {
-    let of_balloon = balloon.feature.and_then(|id| {
-        input
-            .source
-            .features
-            .features
-            .iter()
-            .find(|one| one.id == id)
-    });
-    let Some(found) = of_balloon else {
+    let features = &input.source.features;
+    let Some(found) = balloon.feature.and_then(|id| features.feature(id)) else {
         return String::new();
     };
     let mut rows = Vec::new();

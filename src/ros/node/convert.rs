@@ -130,10 +130,3 @@ pub fn trigger(done: Result<String, String>) -> TriggerResponse {
         message: done.unwrap_or_else(|why| why),
     }
 }
-
-/// Value of an undefined vector.
-pub const NO_VECTOR: Vector3Msg = Vector3Msg {
-    x: f64::NAN,
-    y: f64::NAN,
-    z: f64::NAN,
-};

@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Rotation3, UnitQuaternion, Vector3};
 
-use super::convert::{NO_VECTOR, point, point_of, pose, vector, vector_of};
+use super::convert::{point, point_of, pose, vector, vector_of};
 use crate::features::{Feature, FittedTo, Form, InspectedQuantity, Kind, Relation, RelationKind};
 use crate::probing::execute::Flag;
 use crate::ros::messages::{
@@ -10,7 +10,7 @@ use crate::ros::messages::{
     Pose, Relation as RelationMsg, Vector3 as Vector3Msg,
 };
 use crate::ros::parameters::KIND_NAMES;
-use crate::ros::refusal::unknown_feature;
+use crate::ros::refusal::{NO_VECTOR, unknown_feature};
 
 /// Half of the interval that holds 95 % of a normal distribution, in standard deviations.
 const AT_95_PERCENT: f64 = 1.96;
@@ -23,18 +23,9 @@ const CLEAR: f64 = 0.1e-3;
 
 /// Number of a kind in messages; `None` is a region of which nobody knows what it is.
 pub fn number_of(kind: Option<Kind>) -> u8 {
-    match kind {
-        None => FeatureMsg::KIND_UNKNOWN,
-        Some(Kind::Hole) => FeatureMsg::KIND_HOLE,
-        Some(Kind::Slot) => FeatureMsg::KIND_SLOT,
-        Some(Kind::Pocket) => FeatureMsg::KIND_POCKET,
-        Some(Kind::Boss) => FeatureMsg::KIND_BOSS,
-        Some(Kind::Edge) => FeatureMsg::KIND_EDGE,
-        Some(Kind::Corner) => FeatureMsg::KIND_CORNER,
-        Some(Kind::Plane) => FeatureMsg::KIND_PLANE,
-        Some(Kind::Cylinder) => FeatureMsg::KIND_CYLINDER,
-        Some(Kind::Notch) => FeatureMsg::KIND_NOTCH,
-    }
+    kind.map_or(FeatureMsg::KIND_UNKNOWN, |kind| {
+        FeatureMsg::KIND_HOLE + kind as u8
+    })
 }
 
 /// Kind of a number in messages.
@@ -442,6 +433,32 @@ mod tests {
             message.zone.is_nan()
                 && message.distance_std.is_nan()
                 && message.concentricity.is_nan()
+        );
+    }
+
+    #[test]
+    fn kinds_have_the_numbers_of_the_message() {
+        let numbers = [
+            (Kind::Hole, FeatureMsg::KIND_HOLE),
+            (Kind::Slot, FeatureMsg::KIND_SLOT),
+            (Kind::Pocket, FeatureMsg::KIND_POCKET),
+            (Kind::Boss, FeatureMsg::KIND_BOSS),
+            (Kind::Edge, FeatureMsg::KIND_EDGE),
+            (Kind::Corner, FeatureMsg::KIND_CORNER),
+            (Kind::Plane, FeatureMsg::KIND_PLANE),
+            (Kind::Cylinder, FeatureMsg::KIND_CYLINDER),
+            (Kind::Notch, FeatureMsg::KIND_NOTCH),
+        ];
+        assert_eq!(numbers.map(|(kind, _)| kind), Kind::ALL);
+        for (kind, number) in numbers {
+            assert_eq!(number_of(Some(kind)), number);
+            assert_eq!(kind_of(number), Ok(Some(kind)));
+            assert_eq!(KIND_NAMES[usize::from(number)], kind.name());
+        }
+        assert_eq!(kind_of(FeatureMsg::KIND_UNKNOWN), Ok(None));
+        assert_eq!(
+            kind_of(10),
+            Err("there is no kind 10: 0 to 9 are".to_owned())
         );
     }
 

@@ -5,7 +5,7 @@ use super::source::{Source, of_program};
 use std::sync::LazyLock;
 
 const WHAT: Bound = Bound {
-    today: 109,
+    today: 108,
     wanted: 8,
 };
 const WHERE: Bound = Bound {

@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use crate::features::Kind;
+use crate::features::{Feature, Kind};
 
 /// A detected feature.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,7 +19,20 @@ pub struct FeaturePlace {
     pub size: Option<f64>,
 }
 
-/// A feature of a drawing.
+impl FeaturePlace {
+    /// Place and size of a feature.
+    pub fn of(feature: &Feature) -> Self {
+        Self {
+            id: feature.id,
+            kind: feature.kind,
+            centre: feature.centre.value,
+            axis: feature.axis.as_ref().map(|axis| axis.value),
+            size: feature.main_size().map(|size| size.value),
+        }
+    }
+}
+
+/// A feature as a drawing has it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SoughtFeature {
     /// its kind

@@ -36,11 +36,7 @@ mod tests {
 
     #[test]
     fn sizes_and_coordinates_are_those_of_the_feature() {
-        let number = |value, std| Measured {
-            value,
-            std: Some(std),
-            ..Measured::default()
-        };
+        let number = |value, std| Measured::new(value, Some(std), Vec::new());
         let hole = Feature {
             kind: Kind::Hole,
             centre: Measured {
@@ -48,11 +44,7 @@ mod tests {
                 std: Some(0.2),
                 ..Measured::default()
             },
-            axis: Some(Measured {
-                value: Vector3::z(),
-                std: Some(1e-3),
-                ..Measured::default()
-            }),
+            axis: Some(Measured::new(Vector3::z(), Some(1e-3), Vec::new())),
             diameter: Some(number(8.0, 0.1)),
             ..Feature::default()
         };

@@ -380,12 +380,11 @@ fn between(from: &AxisEnd, to: &AxisEnd, direction: &Vector3<f64>) -> Measured<f
         .zip(to.own_std)
         .map(|(a, b)| a.hypot(b).hypot(common));
     let touches = distinct(from.place.touches.iter().chain(&to.place.touches).copied());
-    Measured {
-        value: (from.place.value - to.place.value).dot(direction).abs(),
+    Measured::new(
+        (from.place.value - to.place.value).dot(direction).abs(),
         std,
         touches,
-        ..Measured::default()
-    }
+    )
 }
 
 /// A lower bound leaves out so many standard deviations of the leans of the touches on its wall, in
@@ -504,12 +503,7 @@ impl AxisEnd {
         std: impl Fn(&Fit<S>) -> Option<f64>,
     ) -> Measured<Point3<f64>> {
         let touches = distinct(fitted.touches.iter().chain(&self.place.touches).copied());
-        Measured {
-            value: self.place.value,
-            std: fitted.confirmed().and_then(std),
-            touches,
-            ..Measured::default()
-        }
+        Measured::new(self.place.value, fitted.confirmed().and_then(std), touches)
     }
 }
 
@@ -592,12 +586,7 @@ fn rim_feature(measure: &Measure, rim: &RoundOpening) -> Feature {
     let std = fitted
         .confirmed()
         .and_then(|fit| fit.lateral_std(&rim.centre));
-    let centre = Measured {
-        value: rim.centre,
-        std,
-        touches: Vec::new(),
-        ..Measured::default()
-    };
+    let centre = Measured::new(rim.centre, std, Vec::new());
     Feature {
         diameter: Some(fitted.number(2.0 * fitted.surface.radius, &[(Freedom::Size, 2.0)])),
         axis: Some(fitted.axis(&rim.out)),
@@ -640,10 +629,7 @@ fn of_other_outline(measure: &Measure, round: &[&Wall], flat: &[&Slot]) -> Vec<F
     };
     let named = |outline: OpeningOutline| Feature {
         kind: outline.kind,
-        depth: Some(Measured {
-            value: outline.depth,
-            ..Measured::default()
-        }),
+        depth: Some(Measured::new(outline.depth, None, Vec::new())),
         through: outline.through,
         form: Some(Form::Round(outline.form)),
         ..rim_feature(measure, &outline.rim)
@@ -691,18 +677,10 @@ fn cylinder_feature(measure: &Measure, wall: &Wall) -> Feature {
     let fitted = measure.cylinder(wall, None);
     let middle = fitted.surface.nearest_on_axis(&wall.at(wall.middle()));
     let std = fitted.confirmed().and_then(|fit| fit.lateral_std(&middle));
-    let centre = Measured {
-        value: middle,
-        std,
-        touches: fitted.touches.clone(),
-        ..Measured::default()
-    };
+    let centre = Measured::new(middle, std, fitted.touches.clone());
     Feature {
         diameter: Some(fitted.number(2.0 * fitted.surface.radius, &[(Freedom::Size, 2.0)])),
-        length: Some(Measured {
-            value: wall.height(),
-            ..Measured::default()
-        }),
+        length: Some(Measured::new(wall.height(), None, Vec::new())),
         axis: Some(fitted.axis(&wall.axis)),
         walls: Some(Walls::Round(fitted.surface)),
         form: measure.round_form(&fitted, &wall.segments).map(Form::Round),
@@ -766,10 +744,7 @@ fn slot_feature(measure: &Measure, slot: &Slot, kind: Kind) -> Feature {
         measure.observed.touched_share(&slot.walls)
     };
     let depth = if slot.through == Some(true) && fitted.to == FittedTo::Mesh {
-        Measured {
-            value: slot.depth,
-            ..Measured::default()
-        }
+        Measured::new(slot.depth, None, Vec::new())
     } else {
         extent(measure, &fitted, &opening, &floor, &axis.value)
     };
@@ -907,12 +882,7 @@ fn corner_of(measure: &Measure, planes: [usize; 3]) -> Option<Feature> {
     let to = fitted_to(&[&planes[0], &planes[1], &planes[2]]);
     Some(Feature::new(
         Kind::Corner,
-        Measured {
-            value: point,
-            std,
-            touches,
-            ..Measured::default()
-        },
+        Measured::new(point, std, touches),
         touched,
         to,
     ))

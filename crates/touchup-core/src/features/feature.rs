@@ -57,6 +57,18 @@ pub struct Measured<T> {
     pub is_at_least: bool,
 }
 
+impl<T> Measured<T> {
+    /// A value that is no bound.
+    pub fn new(value: T, std: Option<f64>, touches: Vec<u32>) -> Self {
+        Self {
+            value,
+            std,
+            touches,
+            is_at_least: false,
+        }
+    }
+}
+
 /// A feature of the part, in O.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Feature {

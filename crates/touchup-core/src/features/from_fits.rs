@@ -131,17 +131,9 @@ impl Feature {
         let std = std_at(0, &middle)
             .zip(std_at(1, &middle))
             .map(|(s, t)| s.hypot(t) / sine);
-        let axis = Measured {
-            value,
-            std: None,
-            touches: touches.clone(),
-            ..Measured::default()
-        };
+        let axis = Measured::new(value, None, touches.clone());
         let edge = Self {
-            length: Some(Measured {
-                value: (ends[1] - ends[0]).norm(),
-                ..Measured::default()
-            }),
+            length: Some(Measured::new((ends[1] - ends[0]).norm(), None, Vec::new())),
             points: ends.to_vec(),
             is_convex: Some(is_convex),
             ..Self::touched(Kind::Edge, middle, std, touches)
@@ -162,12 +154,7 @@ impl Feature {
     fn touched(kind: Kind, centre: Point3<f64>, std: Option<f64>, touches: Touches) -> Self {
         Self::new(
             kind,
-            Measured {
-                value: centre,
-                std,
-                touches,
-                ..Measured::default()
-            },
+            Measured::new(centre, std, touches),
             1.0,
             FittedTo::Touches,
         )
@@ -186,12 +173,11 @@ pub(super) fn axis_of<S: Surface>(
     out: &Vector3<f64>,
     touches: &Touches,
 ) -> Measured<Vector3<f64>> {
-    Measured {
-        value: fit.surface.axis_towards(out),
-        std: fit.axis_std(),
-        touches: touches.clone(),
-        ..Measured::default()
-    }
+    Measured::new(
+        fit.surface.axis_towards(out),
+        fit.axis_std(),
+        touches.clone(),
+    )
 }
 
 /// A number with its derivatives by the freedoms.
@@ -201,12 +187,7 @@ pub(super) fn number<S: Surface>(
     by: &[(Freedom, f64)],
     touches: &Touches,
 ) -> Measured<f64> {
-    Measured {
-        value,
-        std: fit.std_by(by),
-        touches: touches.clone(),
-        ..Measured::default()
-    }
+    Measured::new(value, fit.std_by(by), touches.clone())
 }
 
 /// Distance of a place from a plane, m.
@@ -215,10 +196,5 @@ fn apart(plane: &Fit<Plane>, end: &End, touches: &Touches) -> Measured<f64> {
         .dot(&plane.surface.normal())
         .abs();
     let std = plane.std_at(&end.point).map(|std| std.hypot(end.sigma));
-    Measured {
-        value,
-        std,
-        touches: touches.clone(),
-        ..Measured::default()
-    }
+    Measured::new(value, std, touches.clone())
 }

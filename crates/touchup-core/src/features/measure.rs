@@ -499,12 +499,7 @@ impl<S: Surface> Fitted<S> {
     /// A place on the surface, m; its uncertainty is along the normal.
     fn place(&self, value: Point3<f64>) -> Measured<Point3<f64>> {
         let std = self.confirmed().and_then(|fit| fit.std_at(&value));
-        Measured {
-            value,
-            std,
-            touches: self.touches.clone(),
-            ..Measured::default()
-        }
+        Measured::new(value, std, self.touches.clone())
     }
 
     /// The standard deviation at a place without what all touches have in common, m: of a mesh two
@@ -524,21 +519,19 @@ impl<S: Surface> Fitted<S> {
     /// The direction of the surface, oriented along `direction`.
     pub fn axis(&self, direction: &Vector3<f64>) -> Measured<Vector3<f64>> {
         let value = self.surface.axis_towards(direction);
-        Measured {
+        Measured::new(
             value,
-            std: self.confirmed().and_then(Fit::axis_std),
-            touches: self.touches.clone(),
-            ..Measured::default()
-        }
+            self.confirmed().and_then(Fit::axis_std),
+            self.touches.clone(),
+        )
     }
 
     /// A fitted number, or its value without a fit.
     pub fn number(&self, value: f64, by: &[(Freedom, f64)]) -> Measured<f64> {
-        Measured {
+        Measured::new(
             value,
-            std: self.confirmed().and_then(|fit| fit.std_by(by)),
-            touches: self.touches.clone(),
-            ..Measured::default()
-        }
+            self.confirmed().and_then(|fit| fit.std_by(by)),
+            self.touches.clone(),
+        )
     }
 }

@@ -232,12 +232,7 @@ impl Feature {
 
     fn is_round(&mut self, found: &Fit<Cylinder>, touches: &Touches) {
         let centre = found.surface.nearest_on_axis(&self.centre.value);
-        self.centre = Measured {
-            value: centre,
-            std: found.lateral_std(&centre),
-            touches: touches.clone(),
-            ..Measured::default()
-        };
+        self.centre = Measured::new(centre, found.lateral_std(&centre), touches.clone());
         self.axis = Some(self.turned(found, touches));
         self.diameter = Some(number(
             found,
@@ -276,12 +271,7 @@ impl Feature {
             off.dot(&direction)
         };
         let value = start + axis * off.dot(&axis) + direction * along;
-        self.centre = Measured {
-            value,
-            std: found.middle_std(),
-            touches: touches.clone(),
-            ..Measured::default()
-        };
+        self.centre = Measured::new(value, found.middle_std(), touches.clone());
         self.axis = Some(self.turned(found, touches));
         self.walls = Some(Walls::Slot(found.surface));
     }

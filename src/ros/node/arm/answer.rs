@@ -6,18 +6,13 @@ use crate::probing::arm::{
 };
 use crate::probing::execute::{Cell, Ending, Flag, Plan, Probed, ProbedSlide, ProbedTouch};
 use crate::ros::clock::time;
-use crate::ros::messages::{Feature, Header, Point, ProbeResponse, ProbeResult, ProbeTouch, Time};
-use crate::ros::node::convert::{NO_VECTOR, point, pose, vector};
+use crate::ros::messages::{Feature, Header, ProbeResponse, ProbeResult, ProbeTouch, Time};
+use crate::ros::node::convert::{point, pose, vector};
 use crate::ros::node::feature_messages::{flagged, found};
-use crate::ros::refusal::not_probed;
+use crate::ros::refusal::{NO_POINT, NO_VECTOR, not_probed};
 
 /// Message if there is no flagged feature to probe.
 pub const NOTHING_FLAGGED: &str = "nothing is flagged that was not probed already";
-const NOWHERE: Point = Point {
-    x: f64::NAN,
-    y: f64::NAN,
-    z: f64::NAN,
-};
 
 /// Result of a feature that was not begun.
 pub fn refused(target: &Flag, code: u8, message: String) -> ProbeResult {
@@ -287,7 +282,7 @@ fn touch_of(touch: &ProbedTouch, radius: f64, cell: &Cell, offset_ns: i64) -> (T
         verdict: ProbeTouch::HELD_BACK,
         accepted: touch.refused.is_none(),
         reason: touch.refused.clone().unwrap_or_default(),
-        contact: NOWHERE,
+        contact: NO_POINT,
         contact_std: f64::NAN,
         normal: NO_VECTOR,
         approach: vector(&approach),

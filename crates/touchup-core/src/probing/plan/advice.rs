@@ -165,20 +165,9 @@ mod tests {
         let numbers = (0..touches.len() as u32).collect();
         let feature = Feature {
             kind: Kind::Hole,
-            axis: Some(Measured {
-                value: Vector3::z(),
-                ..Measured::default()
-            }),
-            diameter: Some(Measured {
-                value: 2.0 * wall.radius,
-                std: Some(1e-5),
-                touches: numbers,
-                ..Measured::default()
-            }),
-            depth: Some(Measured {
-                value: 10e-3,
-                ..Measured::default()
-            }),
+            axis: Some(Measured::new(Vector3::z(), None, Vec::new())),
+            diameter: Some(Measured::new(2.0 * wall.radius, Some(1e-5), numbers)),
+            depth: Some(Measured::new(10e-3, None, Vec::new())),
             walls: Some(Walls::Round(wall)),
             ..Feature::default()
         };

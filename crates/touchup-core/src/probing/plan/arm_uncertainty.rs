@@ -89,20 +89,15 @@ impl ArmUncertainty {
             .axis
             .iter_mut()
             .for_each(|axis| widen(axis, std::f64::consts::SQRT_2 * self.turn));
-        feature
-            .diameter
-            .iter_mut()
+        // the ends of a slot are round
+        let length = feature
+            .length
+            .as_mut()
+            .filter(|_| feature.kind == Kind::Slot);
+        [feature.diameter.as_mut(), feature.width.as_mut(), length]
+            .into_iter()
+            .flatten()
             .for_each(|size| widen(size, 2.0 * radius));
-        feature
-            .width
-            .iter_mut()
-            .for_each(|size| widen(size, 2.0 * radius));
-        if feature.kind == Kind::Slot {
-            feature
-                .length
-                .iter_mut()
-                .for_each(|size| widen(size, 2.0 * radius));
-        }
         feature
     }
 }
@@ -131,14 +126,7 @@ mod tests {
             turn: 4e-3,
             ..ArmUncertainty::default()
         };
-        let number = |std| {
-            Some(Measured {
-                value: 8e-3,
-                std: Some(std),
-                touches: Vec::new(),
-                ..Measured::default()
-            })
-        };
+        let number = |std| Some(Measured::new(8e-3, Some(std), Vec::new()));
         let hole = Feature {
             kind: Kind::Hole,
             centre: Measured {
@@ -147,12 +135,7 @@ mod tests {
                 touches: Vec::new(),
                 ..Measured::default()
             },
-            axis: Some(Measured {
-                value: Vector3::z(),
-                std: Some(1e-3),
-                touches: Vec::new(),
-                ..Measured::default()
-            }),
+            axis: Some(Measured::new(Vector3::z(), Some(1e-3), Vec::new())),
             diameter: number(20e-6),
             depth: number(7e-6),
             ..Feature::default()
