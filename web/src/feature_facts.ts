@@ -3,7 +3,7 @@
  */
 import { Vector3 } from "three";
 import { t } from "./language";
-import { type NotedFeature, FittedTo, Kind, type Num, Status, triple } from "./messages";
+import { type NotedFeature, FittedTo, Kind, Status, triple } from "./messages";
 import { angle, expanded, length } from "./numbers";
 import type { TextKey } from "./texts";
 
@@ -44,17 +44,14 @@ export interface Size {
 
 /** Every length that is known of it, the one that it is ordered by first. */
 export function sizes(feature: NotedFeature): Size[] {
-  const size = (text: TextKey, value: Num, std: Num, isAtLeast = false): Size | null => {
+  const size = (name: "diameter" | "width" | "length" | "depth"): Size | null => {
+    const isAtLeast = name === "depth" && feature.depth_is_at_least;
+    const [value, std] = [feature[name], feature[`${name}_std`]];
     const words = length(value, isAtLeast ? null : std, isAtLeast);
+    const text = name === "depth" && feature.kind === Kind.boss ? "height" : name;
     return words === null ? null : { text, words, value: value ?? 0, u: expanded(std), isAtLeast };
   };
-  const all = [
-    size("diameter", feature.diameter, feature.diameter_std),
-    size("width", feature.width, feature.width_std),
-    size("length", feature.length, feature.length_std),
-    size(feature.kind === Kind.boss ? "height" : "depth", feature.depth, feature.depth_std, feature.depth_is_at_least),
-  ];
-  return all.filter((each) => each !== null);
+  return (["diameter", "width", "length", "depth"] as const).map(size).filter((each) => each !== null);
 }
 
 /** "Ø 8.021 ± 0.025 mm", "6.00 × 20.0 mm": its main numbers in one line. */

@@ -43,7 +43,10 @@ export interface FormDeviation {
   lobes: number[];
 }
 
-export interface Feature {
+/** Numbers with their standard uncertainties. */
+type Stated<Name extends string> = Record<Name | `${Name}_std`, Num>;
+
+export interface Feature extends Stated<"diameter" | "length" | "width" | "depth" | "cone_angle"> {
   id: number;
   kind: number;
   status: number;
@@ -56,17 +59,7 @@ export interface Feature {
   axis: Xyz;
   axis_std: Num;
   direction: Xyz;
-  diameter: Num;
-  diameter_std: Num;
-  length: Num;
-  length_std: Num;
-  width: Num;
-  width_std: Num;
-  depth: Num;
-  depth_std: Num;
   depth_is_at_least: boolean;
-  cone_angle: Num;
-  cone_angle_std: Num;
   through: number;
   convex: number;
   group: number;
@@ -88,18 +81,10 @@ export interface NotedFeature extends Feature {
   is_locked: boolean;
 }
 
-export interface Relation {
+export interface Relation extends Stated<"zone" | "angle" | "distance" | "concentricity"> {
   kind: number;
   of_feature: number;
   to_feature: number;
-  zone: Num;
-  zone_std: Num;
-  angle: Num;
-  angle_std: Num;
-  distance: Num;
-  distance_std: Num;
-  concentricity: Num;
-  concentricity_std: Num;
 }
 
 export interface FeatureArray {

@@ -157,3 +157,110 @@ fn what_is_no_definition_is_refused_by_name() {
     let reason = "geometry_msgs/Twist is no type: is it described below src/ros/messages/standard?";
     assert_eq!(rust::structs(&unknown).unwrap_err(), reason);
 }
+
+/// Messages as `web/src/messages.ts` has them; whether with all of their fields.
+const OF_PAGE: [(&str, &str, bool); 9] = [
+    ("Feature", "msg/msg/Feature.msg", true),
+    ("FormDeviation", "msg/msg/FormDeviation.msg", true),
+    ("Relation", "msg/msg/Relation.msg", true),
+    ("FeatureArray", "msg/msg/FeatureArray.msg", true),
+    ("Mismatch", "msg/msg/HapticMismatch.msg", false),
+    ("ProbeResult", "msg/msg/ProbeResult.msg", false),
+    ("ProbeTouch", "msg/msg/ProbeTouch.msg", false),
+    (
+        "Marker",
+        "src/ros/messages/standard/visualization_msgs/Marker.msg",
+        false,
+    ),
+    (
+        "DiagnosticStatus",
+        "src/ros/messages/standard/diagnostic_msgs/DiagnosticStatus.msg",
+        false,
+    ),
+];
+
+fn in_tree(path: &str) -> String {
+    let root = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
+    std::fs::read_to_string(format!("{root}/{path}")).unwrap()
+}
+
+/// Names and types of an interface; those of `Stated` are numbers with a `_std`.
+fn fields_of_page(page: &str, name: &str) -> Vec<(String, String)> {
+    let begin = page.find(&format!("export interface {name} ")).unwrap();
+    let (head, body) = page[begin..].split_once("{\n").unwrap();
+    let stated = head.split('"').skip(1).step_by(2);
+    let numbers = stated.flat_map(|number| [number.to_owned(), format!("{number}_std")]);
+    let lines = body[..body.find("\n}").unwrap()].lines();
+    let fields = lines.filter_map(|line| line.trim().strip_suffix(';')?.split_once(": "));
+    numbers
+        .map(|number| (number, "Num".to_owned()))
+        .chain(fields.map(|(field, item)| (field.to_owned(), item.to_owned())))
+        .collect()
+}
+
+/// Type of a field in the page: NaN is `null` there.
+fn type_of_page(field: &definition::Field) -> String {
+    let item = match field.item.rsplit('/').next().unwrap() {
+        "bool" => "boolean",
+        "float32" | "float64" => "Num",
+        "Point" | "Vector3" => "Xyz",
+        basic if basic == "byte" || basic.contains("int") => "number",
+        other => other,
+    };
+    match field.length {
+        definition::Length::One => item.to_owned(),
+        _ => format!("{item}[]"),
+    }
+}
+
+#[test]
+fn types_of_the_page_are_those_of_the_messages() {
+    let page = in_tree("web/src/messages.ts");
+    for (name, path, is_whole) in OF_PAGE {
+        let message = &parse("touchup_msgs", path, &in_tree(path)).unwrap()[0];
+        let of_page = fields_of_page(&page, name);
+        for (field, item) in &of_page {
+            let defined = message.fields.iter().find(|one| one.name == *field);
+            let defined = defined.unwrap_or_else(|| panic!("{path} has no {field}"));
+            // of messages within messages the page has parts alone
+            let is_same = item.contains('{') || *item == type_of_page(defined);
+            assert!(is_same, "{name}.{field} is {item}, and not as in {path}");
+        }
+        let missing = message
+            .fields
+            .iter()
+            .find(|field| is_whole && of_page.iter().all(|(one, _)| *one != field.name));
+        assert!(missing.is_none(), "the page's {name} lacks {missing:?}");
+    }
+}
+
+#[test]
+fn constants_of_the_page_are_those_of_the_messages() {
+    let page = in_tree("web/src/messages.ts");
+    let constants = |path: &str| parse("", path, &in_tree(path)).unwrap().remove(0).constants;
+    for (name, prefix) in [
+        ("Kind", "KIND_"),
+        ("Status", "STATUS_"),
+        ("FittedTo", "FITTED_TO_"),
+    ] {
+        let begin = page.find(&format!("export const {name} = {{")).unwrap();
+        let text = &page[begin..begin + page[begin..].find('}').unwrap()];
+        let mut of_page: Vec<_> = text.split(['{', ',']).skip(1).map(str::trim).collect();
+        of_page.retain(|constant| !constant.is_empty());
+        let defined = constants("msg/msg/Feature.msg")
+            .into_iter()
+            .filter_map(|constant| {
+                let name = constant.name.strip_prefix(prefix)?.to_lowercase();
+                Some(format!("{name}: {}", constant.value))
+            });
+        assert_eq!(of_page, defined.collect::<Vec<_>>(), "{name}");
+    }
+    let results = constants("msg/msg/ProbeResult.msg");
+    let value = |name: &str| &results.iter().find(|one| one.name == name).unwrap().value;
+    for (of_page, name) in [("PLANNED", "PLANNED"), ("STOPPED_FROM", "FORCE_OVER_LIMIT")] {
+        assert!(
+            page.contains(&format!("export const {of_page} = {};", value(name))),
+            "{of_page}"
+        );
+    }
+}
