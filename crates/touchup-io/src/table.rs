@@ -1,4 +1,4 @@
-//! Tables whose first row names the columns, in any order, as [`super::table_rows`] reads them.
+//! Tables whose first row names the columns, in any order, as `table_rows` reads them.
 
 use std::path::{Path, PathBuf};
 
