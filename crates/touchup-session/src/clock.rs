@@ -1,8 +1,9 @@
-//! Steady time, of this machine or of a test that moves it by hand.
+//! Steady time of this machine, or of a test that advances it.
 //!
 //! All deadlines come from a [`Clock`]. With [`Clock::manual`] time stands still until
-//! [`ManualClock::advance`], so a deadline passes when a test says so, however busy the machine is.
-//! Threads that say so by [`Clock::begin_work`] are waited for: time then passes only while all of
+//! [`ManualClock::advance`], so the test decides when a deadline passes, however busy the machine
+//! is. Time waits for threads registered by [`Clock::begin_work`]: it passes only while all of them
+//! wait, so a slow thread is never late.
 //! them wait, so none of them is late, however slow it is.
 
 use std::collections::BTreeMap;
@@ -11,26 +12,26 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// What is behind a lock whose holder may have panicked: of values that are valid after any panic.
+/// Locks a mutex even after a panic of its holder; only for values that stay valid then.
 pub(crate) fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// How long a wait on a manual clock sleeps before it looks at its channel or condition again. No
-/// result depends on it.
+/// Interval at which a wait on a manual clock checks its channel or condition again. No result
+/// depends on it.
 const LOOK: Duration = Duration::from_micros(500);
-/// A thread that does not wait again within this time hangs: a test fails then. No result depends
-/// on it.
+/// Limit for a thread to wait again; beyond it the thread hangs and the test fails. No result
+/// depends on it.
 const HUNG: Duration = Duration::from_secs(120);
 
-/// Where time comes from. Clones show the same time.
+/// Source of time. Clones show the same time.
 #[derive(Clone, Debug, Default)]
 pub struct Clock {
     /// `None`: the steady clock of this machine
     manual: Option<Arc<Manual>>,
 }
 
-/// The hand that moves a [`Clock::manual`].
+/// The control of a [`Clock::manual`].
 #[derive(Debug)]
 pub struct ManualClock(Arc<Manual>);
 
@@ -48,11 +49,11 @@ struct Waits {
     next: u64,
     /// deadlines of the running waits, since `begun`
     deadlines: BTreeMap<u64, Duration>,
-    /// threads, and pieces of work, that time waits for until they wait themselves
+    /// number of threads and tasks that time waits for until they wait themselves
     workers: usize,
 }
 
-/// Time of a manual clock stands still until this is dropped, or its holder waits on that clock.
+/// Stops the time of a manual clock until dropped, or until its holder waits on that clock.
 #[derive(Debug)]
 pub struct Working(Option<Arc<Manual>>);
 
@@ -62,13 +63,13 @@ impl Clock {
         Self::default()
     }
 
-    /// A clock that stands still until its hand moves it.
+    /// A clock that stands still until [`ManualClock::advance`].
     pub fn manual() -> (Self, ManualClock) {
         Self::moved_by_hand(false)
     }
 
-    /// A clock that a sleeping thread moves too, by as long as it sleeps: what a simulated device
-    /// does in its time is done as fast as the others keep up. One thread may sleep.
+    /// A clock that also advances by each sleep of a thread, so a simulated device runs as fast as
+    /// the other threads keep up. Only one thread may sleep.
     pub fn lock_step() -> (Self, ManualClock) {
         Self::moved_by_hand(true)
     }
@@ -89,8 +90,7 @@ impl Clock {
         )
     }
 
-    /// From here on time waits for the thread, or the piece of work, that this is handed to. A
-    /// thread that waits on the clock has to have one.
+    /// Registers a thread or task that time waits for. A thread that waits on the clock needs one.
     pub fn begin_work(&self) -> Working {
         if let Some(manual) = &self.manual {
             manual.waits().workers += 1;
@@ -98,7 +98,7 @@ impl Clock {
         Working(self.manual.clone())
     }
 
-    /// Whether it is moved by hand.
+    /// Whether a test advances it.
     pub fn is_manual(&self) -> bool {
         self.manual.is_some()
     }
@@ -110,7 +110,7 @@ impl Clock {
             .map_or_else(Instant::now, |manual| manual.begun + manual.waits().elapsed)
     }
 
-    /// Time since `then`; zero where that is still to come.
+    /// Time since `then`; zero if `then` is in the future.
     pub fn since(&self, then: Instant) -> Duration {
         self.now().saturating_duration_since(then)
     }
@@ -132,10 +132,10 @@ impl Clock {
         );
     }
 
-    /// As [`Receiver::recv_timeout`]: what was sent before the deadline passed is received.
+    /// Receives like [`Receiver::recv_timeout`], including every message sent before the deadline.
     ///
     /// # Errors
-    /// As there.
+    /// Those of [`Receiver::recv_timeout`].
     pub fn recv_timeout<T>(
         &self,
         receiver: &Receiver<T>,
@@ -155,8 +155,8 @@ impl Clock {
         }
     }
 
-    /// As [`Condvar::wait_timeout_while`], but does not return whether the time ran out: the caller
-    /// checks the value.
+    /// Waits like [`Condvar::wait_timeout_while`], but does not return whether time ran out: the
+    /// caller checks the value.
     pub fn wait_while<'a, T>(
         &self,
         condvar: &Condvar,
@@ -186,11 +186,11 @@ impl Clock {
 }
 
 impl ManualClock {
-    /// Moves time on as soon as all workers wait, and returns when no wait of before is left whose
-    /// deadline has passed, and all workers wait again.
+    /// Advances time once all workers wait; returns when every earlier wait with a passed deadline
+    /// has ended and all workers wait again.
     ///
     /// # Panics
-    /// When somebody hangs.
+    /// If a thread hangs.
     pub fn advance(&self, by: Duration) {
         let to = self.0.waits().elapsed.saturating_add(by);
         self.0.move_to(to, u64::MAX);
@@ -202,7 +202,7 @@ impl ManualClock {
         self.0.waits().deadlines.len()
     }
 
-    /// Number of waits begun so far: a new wait has seen the time as it was then.
+    /// Total number of waits begun; a new wait has read the time of its begin.
     pub fn begun(&self) -> u64 {
         self.0.waits().next
     }
@@ -243,7 +243,7 @@ impl Manual {
         waits
     }
 
-    /// Moves time on and waits for the threads that it wakes, but not for the wait `own`.
+    /// Advances time and waits for the threads that wake, except for the wait `own`.
     fn move_to(&self, to: Duration, own: u64) {
         let mut waits = self.wait_until_idle(self.waits());
         waits.elapsed = waits.elapsed.max(to);
@@ -365,8 +365,7 @@ mod tests {
         });
     }
 
-    /// However slow it is, a thread that works is not late: both loops do what they do in the same
-    /// order every time.
+    /// A working thread is never late, however slow: both loops run in the same order every time.
     #[test]
     fn time_waits_for_workers_and_passes_while_they_wait() {
         let (clock, hand) = Clock::manual();
@@ -379,7 +378,7 @@ mod tests {
                 let _work = work;
                 for _ in 0..3 {
                     clock.sleep(SECOND);
-                    // time is stopped, so this takes none of it
+                    // time is stopped, so the sleep takes none
                     thread::sleep(Duration::from_millis(20));
                     sender.send(clock.since(begun)).unwrap();
                 }

@@ -1,4 +1,4 @@
-//! What speaks against a recording on a scan, before anything is made of it.
+//! Checks a recording against a scan before any refinement.
 
 use std::cell::RefCell;
 
@@ -10,25 +10,25 @@ use crate::replay::{Recording, ReplayError, each_sample};
 use crate::scene::Scene;
 use crate::threads::Threads;
 
-/// What was found.
+/// Findings on a recording.
 #[derive(Debug)]
 pub struct InputCheck {
-    /// the surest first; empty: nothing speaks against it
+    /// the surest first; empty if there is none
     pub findings: Vec<InputFinding>,
-    /// what scene and recording say together of the clocks
+    /// clock offset that scene and recording show together
     pub clock_offset: Option<ClockOffset>,
-    /// what a better recording would not lack
+    /// losses that a better recording would avoid
     pub losses: Vec<String>,
 }
 
-/// Replays a recording as the scene has it, and judges what comes of it on the scan.
+/// Replays a recording with the settings of the scene and checks its samples against the scan.
 ///
 /// - `scan`: m, in O.
-/// - `markers`: makes the poses of a recording that holds markers.
+/// - `markers`: computes the poses of a recording of markers.
 /// - `at_each`: called after each record, to show the progress.
 ///
 /// # Errors
-/// As [`each_sample`].
+/// Those of [`each_sample`].
 pub fn check_input(
     recording: Recording,
     scan: &TriMesh,

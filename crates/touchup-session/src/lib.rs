@@ -1,17 +1,17 @@
 //! One session: the scene file, both rates side by side, and the result.
 //!
-//! | module | what it does |
+//! | module | content |
 //! |---|---|
-//! | [`clock`] | steady time, of the machine or of a test that moves it |
-//! | [`threads`] | workers for the rooms that are pure |
-//! | [`scan`] | a mesh or a point cloud of a file, as a mesh |
-//! | [`scene`] | the YAML that names the parts of a scene and their parameters |
-//! | [`live`] | the engine: the haptic update at every sample, the patch beside it or at the end |
-//! | [`replay`] | a recording from its first message to its last, as messages or as samples |
-//! | [`calibration`] | tip, payload and place of the scan: from a recording to what is put into a scene |
-//! | [`input_check`] | what speaks against a recording on a scan |
-//! | [`refinement`] | a scan refined by a recording, from its first message to the result |
-//! | [`sweep`] | many refinements as jobs, and what moved between two of them |
+//! | [`clock`] | steady time of the machine, or of a test that advances it |
+//! | [`threads`] | worker threads for crates without threads |
+//! | [`scan`] | reads a mesh or a point cloud from a file as a mesh |
+//! | [`scene`] | YAML file of the sections of a scene and their parameters |
+//! | [`live`] | engine: haptic update at every sample, patch beside it or at the end |
+//! | [`replay`] | a recording from first to last message, as messages or samples |
+//! | [`calibration`] | tip, payload and pose of the scan: from a recording to scene settings |
+//! | [`input_check`] | findings against a recording on a scan |
+//! | [`refinement`] | refines a scan by a recording, from first message to result |
+//! | [`sweep`] | runs many refinements as jobs, and compares two of them |
 //! | [`session`] | one run: its recording, its result, and the inputs that reproduce it |
 #![cfg_attr(not(test), warn(clippy::unwrap_used))]
 

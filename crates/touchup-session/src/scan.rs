@@ -1,4 +1,4 @@
-//! A scan as it comes: a mesh, or points through which a surface is made.
+//! Reads a scan: a mesh, or points that it makes a surface of.
 
 use std::path::{Path, PathBuf};
 
@@ -10,18 +10,18 @@ use touchup_io::mesh_file::{read_appearance, read_mesh_or_points, repaired};
 
 use crate::threads::Threads;
 
-/// Why there is no mesh of a scan.
+/// Errors of reading a scan.
 #[derive(Debug, thiserror::Error)]
 pub enum ScanError {
-    /// The file cannot be read, or what is in it is no mesh.
+    /// The file is unreadable or holds no mesh.
     #[error(transparent)]
     File(#[from] MeshFileError),
-    /// Its points make no surface.
+    /// The points make no surface.
     #[error("{}: {source}", path.display())]
     Cloud {
         /// the file
         path: PathBuf,
-        /// why, and what to do
+        /// reason and remedy
         source: CloudError,
     },
 }
@@ -31,19 +31,20 @@ pub enum ScanError {
 pub struct Scan {
     /// vertices in m, in the file's own frame, which becomes O
     pub mesh: TriMesh,
-    /// defects of the file, or of the surface that was made
+    /// defects of the file, or of the reconstructed surface
     pub repair: RepairReport,
-    /// how the mesh was made, where the file holds points
+    /// reconstruction of the mesh, if the file holds points
     pub cloud: Option<CloudSummary>,
 }
 
-/// Reads a mesh (PLY, STL, OBJ) and repairs it; of a point cloud (PLY without faces, PCD, text,
-/// E57) a surface is made, which a warning says. Same file, same mesh, on any number of threads.
+/// Reads a mesh (PLY, STL, OBJ) and repairs it; makes a surface of a point cloud (PLY without
+/// faces, PCD, text, E57), with a warning. The same file gives the same mesh, on any number of
+/// threads.
 ///
-/// - `unit`: the unit of the coordinates in the file; the mesh comes out in m.
+/// - `unit`: of the coordinates in the file; the mesh is in m.
 ///
 /// # Errors
-/// [`ScanError`]: one line that names the file and what to do.
+/// [`ScanError`]: one line that names the file and a remedy.
 pub fn read_scan(path: &Path, unit: MeshUnit) -> Result<Scan, ScanError> {
     let cloud = match read_mesh_or_points(path, unit)? {
         MeshOrPoints::Mesh(file) => {
@@ -75,7 +76,7 @@ pub fn read_scan(path: &Path, unit: MeshUnit) -> Result<Scan, ScanError> {
     })
 }
 
-/// Says of how many faces a corner was no place.
+/// Warns of faces left out because a corner has no finite coordinates.
 pub fn warn_of_left_out(path: &Path, repair: &RepairReport) {
     if repair.dropped_not_finite > 0 {
         let faces = repair.dropped_not_finite;
@@ -86,14 +87,13 @@ pub fn warn_of_left_out(path: &Path, repair: &RepairReport) {
     }
 }
 
-/// Colours and texture of a scan on the mesh that was refined of it; nothing where the file has
-/// none.
+/// Colours and texture of a scan, transferred to its refined mesh; empty if the file has none.
 ///
 /// - `path`, `unit`: of the scan.
-/// - `places`: for each vertex of `mesh` where it is, or was, on the scan, m in O.
+/// - `places`: for each vertex of `mesh` its present or former position on the scan, m in O.
 ///
 /// # Errors
-/// [`MeshFileError`] when the file cannot be read any more.
+/// [`MeshFileError`] if the file is no longer readable.
 pub fn carried_over(
     path: &Path,
     unit: MeshUnit,

@@ -1,4 +1,4 @@
-//! The threads of the process as workers, as the rooms that are pure have none of their own; and which of them give way.
+//! Worker threads for the crates that have none of their own, and their priority.
 
 use std::collections::VecDeque;
 use std::sync::{Mutex, PoisonError};
@@ -6,14 +6,13 @@ use std::thread::{Builder, available_parallelism, scope};
 
 use touchup_core::mesh::{Job, Workers};
 
-/// Steps by which a thread gives way to others (setpriority(2)): with a third of their share its
-/// work still comes to an end if the machine is busy.
+/// Priority steps below the ordinary threads (setpriority(2)): with a third of their share the work
+/// still finishes on a busy machine.
 const STEPS_BEHIND: i32 = 5;
 
-/// Has this thread, and those that it begins from now on, give way to the ordinary threads of the
-/// process: a sample is answered first, and what follows from it has the time that is left. Needs
-/// no privilege. If the system has no priority for a single thread, or refuses it, the work is
-/// done at the ordinary one.
+/// Lowers the priority of this thread, and of threads that it starts later, below the ordinary
+/// threads of the process: samples come first, further work uses the remaining time. Needs no
+/// privilege. If the system has no priority per thread, or refuses it, the priority stays ordinary.
 pub fn give_way() {
     #[cfg(target_os = "linux")]
     {
@@ -24,7 +23,7 @@ pub fn give_way() {
     }
 }
 
-/// As many as the machine runs at the same time.
+/// As many threads as the machine runs at the same time.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Threads;
 
@@ -48,7 +47,7 @@ impl Workers for Threads {
         };
         scope(|threads| {
             for _ in 0..helpers {
-                // a thread that cannot be had leaves its share to the others
+                // without this thread the others do its share
                 let _ = Builder::new().spawn_scoped(threads, work);
             }
             work();
@@ -60,10 +59,10 @@ impl Workers for Threads {
 mod tests {
     use super::*;
 
-    /// The priority of this thread as proc(5) has it in the 19th field.
+    /// The priority of this thread: 19th field of proc(5) `stat`.
     fn niceness() -> i32 {
         let stat = std::fs::read_to_string("/proc/thread-self/stat").unwrap();
-        // the second field is a name in parentheses, which may have blanks
+        // the second field is a name in parentheses, possibly with blanks
         let (_, fields) = stat.rsplit_once(')').unwrap();
         fields
             .split_whitespace()

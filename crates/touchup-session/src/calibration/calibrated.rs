@@ -1,4 +1,4 @@
-//! What a calibration came to, and the scene with it in.
+//! Result of a calibration, and the scene that contains it.
 
 use std::fmt::Display;
 use std::time::SystemTime;
@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::scene::{Scene, SceneError, Setting};
 
-/// The calibrations that a recording is made for.
+/// Calibrations that use a recording of their own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CalibrationKind {
@@ -16,7 +16,7 @@ pub enum CalibrationKind {
     Tip,
     /// weight and bias on the force sensor
     Payload,
-    /// where the scan lies in the frame of the poses
+    /// pose of the scan in the frame of the recorded poses
     Scan,
 }
 
@@ -31,26 +31,25 @@ impl CalibrationKind {
     }
 }
 
-/// The result of a calibration, as it is printed, and what it changes in a scene.
+/// A printable result of a calibration that changes a scene.
 pub trait Calibrated: Serialize + Display {
-    /// Sets it in `scene`; returns the settings for the text of one, and in one line where they
-    /// come from.
+    /// Sets the result in `scene`; returns the settings for its text, and one line on their source.
     fn set_in(&self, scene: &mut Scene) -> (Vec<Setting>, String);
 }
 
-/// What a calibration came to.
+/// Result of a calibration, with doubts and losses.
 #[derive(Clone, Debug)]
 pub struct Calibration<F> {
     /// the result
     pub found: F,
-    /// in words: what should be looked at before it is used
+    /// in words: doubts to check before use
     pub doubts: Vec<String>,
-    /// in words: what a better recording would not lack
+    /// in words: losses that a better recording would avoid
     pub losses: Vec<String>,
 }
 
 impl<F> Calibration<F> {
-    /// The same with what `of` makes of the result.
+    /// The same calibration with its result mapped by `of`.
     pub fn map<G>(self, of: impl FnOnce(F) -> G) -> Calibration<G> {
         let Self {
             found,
@@ -65,21 +64,21 @@ impl<F> Calibration<F> {
     }
 }
 
-/// Between what a remark says and its date.
+/// Separates a remark from its date.
 const BEFORE_DATE: &str = "; ";
 
-/// The text of a scene with a result in it; a comment says where it comes from, and the day, UTC.
+/// The text of a scene with a result set; a comment gives its source and the day, UTC.
 ///
-/// - `yaml`: the scene as it was.
+/// - `yaml`: the earlier text.
 ///
 /// # Errors
-/// [`SceneError`]: a text that is no scene, or in which it cannot be set.
+/// [`SceneError`] if the text is no scene, or the result cannot be set in it.
 pub fn calibrated_scene(
     yaml: &str,
     found: &impl Calibrated,
     now: SystemTime,
 ) -> Result<String, SceneError> {
-    // without the files that it names: they are no part of the text
+    // without the files that it names, which are not part of the text
     let mut expected = Scene::from_yaml(yaml)?;
     let (settings, remark) = found.set_in(&mut expected);
     let date = DateTime::<Utc>::from(now).date_naive();
@@ -91,8 +90,7 @@ pub fn calibrated_scene(
     )
 }
 
-/// The day on which a calibration was put into the text of a scene, UTC; `None` where it does not
-/// say so.
+/// Day of a calibration in the text of a scene, UTC; `None` if the text gives none.
 pub fn calibrated_on(yaml: &str, kind: CalibrationKind) -> Option<NaiveDate> {
     let key = match kind {
         CalibrationKind::Tip => "offset_mm",
@@ -149,8 +147,8 @@ mod tests {
             NaiveDate::from_ymd_opt(2026, 2, 28)
         );
         assert_eq!(calibrated_on(&made, CalibrationKind::Scan), None);
-        // one of an older version says no day, a comment of somebody else is none of ours, and the
-        // tip of an arm is another one
+        // an older version writes no day, another's comment does not count, and the tip of an arm
+        // is a different key
         let others = [
             ("; 2026-02-28", ""),
             ("touchup calibrate tip", "by hand"),

@@ -1,4 +1,4 @@
-//! Why a calibration has no result.
+//! Errors of a calibration.
 
 use std::path::PathBuf;
 
@@ -9,19 +9,19 @@ use touchup_io::table::TableError;
 
 use crate::replay::ReplayError;
 
-/// Why a calibration has no result: what is wrong with its input, and how to make a better one.
+/// Error of a calibration: the fault of its input, and how to make a better one.
 #[derive(Debug, thiserror::Error)]
 pub enum CalibrationError {
     /// The recording cannot be replayed.
     #[error(transparent)]
     Replay(#[from] ReplayError),
-    /// A parameter of the scene.
+    /// A scene parameter outside its range.
     #[error(transparent)]
     Setting(#[from] SettingError),
-    /// A table cannot be read.
+    /// An unreadable table.
     #[error(transparent)]
     Table(#[from] TableError),
-    /// A swing that does not determine the tip.
+    /// A swing does not determine the tip.
     #[error("{path}: {error}", path = path.display())]
     Tip {
         /// the recording
@@ -29,7 +29,7 @@ pub enum CalibrationError {
         /// in words
         error: TipError,
     },
-    /// Static poses that do not determine the payload.
+    /// Static poses do not determine the payload.
     #[error("{path}: {error}", path = path.display())]
     Payload {
         /// the recording or the table
@@ -37,10 +37,10 @@ pub enum CalibrationError {
         /// in words
         error: PayloadError,
     },
-    /// … of an arm.
+    /// Static segments of an arm do not determine the payload.
     #[error("{}", advice(.0))]
     PayloadOfArm(PayloadError),
-    /// Pairs that do not determine where the scan lies.
+    /// Pairs do not determine the pose of the scan.
     #[error("{path}: {error}", path = path.display())]
     Pairs {
         /// the table
@@ -48,7 +48,7 @@ pub enum CalibrationError {
         /// in words
         error: PairsError,
     },
-    /// The stylus rested on more or on fewer points than were picked on the scan.
+    /// The number of dwells of the stylus differs from the number of points picked on the scan.
     #[error(
         "{path}: {dwells} dwells of half a second in contact, and {points} points picked on the scan; they are matched in order: dwell \
          once on each, in the order of the file",
@@ -57,9 +57,9 @@ pub enum CalibrationError {
     Dwells {
         /// the recording
         path: PathBuf,
-        /// in the recording
+        /// number in the recording
         dwells: usize,
-        /// in the table
+        /// number in the table
         points: usize,
     },
 }

@@ -1,8 +1,8 @@
-//! Calibrations of stylus, sensor and scan: from a recording, from a table, or from what an arm
-//! measured, to what is put into a scene.
+//! Calibrations of stylus, sensor and scan: from a recording, a table, or measurements of an arm to
+//! settings of a scene.
 //!
-//! `touchup calibrate` prints what comes of them, and the setup on the operator's page shows it;
-//! the equations are in [`touchup_core::calibrate`] and [`touchup_core::align`].
+//! `touchup calibrate` prints the results, and the setup on the operator's page shows them; the
+//! equations are in [`touchup_core::calibrate`] and [`touchup_core::align`].
 
 mod calibrated;
 mod error;

@@ -1,9 +1,9 @@
-//! Payload identification: weight, centre of mass and bias of the sensor, from static segments of a
-//! recording, of a table, or of an arm.
+//! Payload identification: weight, centre of mass and sensor bias, from static segments of a
+//! recording, a table, or an arm.
 //!
-//! The controller of an arm compensates the weight of the payload set there. So the result goes to
-//! its parameters: `robot.payload_kg` and `robot.payload_centre_mm`. The bias is only shown: a
-//! sensor is zeroed before each touch.
+//! The controller of an arm compensates the weight of its configured payload. So the result goes to
+//! its parameters: `robot.payload_kg` and `robot.payload_centre_mm`. The bias is for display only:
+//! each touch begins with a zeroed sensor.
 
 use std::fmt;
 use std::path::Path;
@@ -24,16 +24,15 @@ use super::vector::{Vector, rounded};
 use crate::reported;
 use crate::scene::{GravityAxes, PayloadSection, Scene, Setting};
 
-/// A residual over this many times the noise has another cause.
+/// Ratio of residual to noise above which the residual has another cause.
 const UNEXPLAINED: f64 = 5.0;
 
-/// How a payload is identified.
+/// Parameters of a payload identification.
 #[derive(Clone, Copy, Debug)]
 pub struct PayloadCalibrationParams {
-    /// Acceleration of gravity, by which the weight is divided, m/s². Default 9.81.
+    /// Acceleration of gravity, m/s², which divides the weight. Default 9.81.
     pub gravity: f64,
-    /// In which axes the wrench is. Default: those that the recording names, and of a table the
-    /// sensor's own.
+    /// Axes of the wrench. Default: those that the recording names; for a table the sensor's own.
     pub wrench_frame: Option<WrenchFrame>,
 }
 
@@ -46,7 +45,8 @@ impl Default for PayloadCalibrationParams {
     }
 }
 
-/// From a recording in which the stylus is held still in free air in several orientations.
+/// Identifies the payload from a recording of the stylus held still in free air, in several
+/// orientations.
 ///
 /// - `at_each`: called after each record, to show the progress.
 ///
@@ -72,7 +72,7 @@ pub fn calibrate_payload(
     })
 }
 
-/// From a table of static poses ([`touchup_io::static_poses`]).
+/// Identifies the payload from a table of static poses ([`touchup_io::static_poses`]).
 ///
 /// # Errors
 /// [`CalibrationError`]
@@ -118,7 +118,7 @@ fn of_poses(
     })
 }
 
-/// From what an arm measured that turned its probe in free air.
+/// Identifies the payload from measurements of an arm that turns its probe in free air.
 ///
 /// - `gravity`: m/s².
 ///
@@ -165,23 +165,23 @@ fn doubt_of_residuals(fit: &PayloadFit, besides: &str) -> Option<String> {
 }
 
 reported! {
-    /// Weight, centre of mass and bias; `named`: whose axes are those of the sensor, and whose
-    /// those of the poses.
+    /// Weight, centre of mass and bias; `named`: owner of the sensor's axes, and of the poses'
+    /// axes.
     #[derive(Clone)]
     pub struct PayloadFound, fn of(fit: &PayloadFit, named: [&'static str; 2]) {
         #[serde(skip)]
         axes: [&'static str; 2] = named,
         static_segments: usize = fit.poses,
-        /// those that did not fit, from 0 on
+        /// indices of outliers, from 0
         left_out: Vec<usize> = fit.rejected.clone(),
         tilt_deg: f64 = fit.tilt.to_degrees(),
         weight_n: f64 = fit.weight[0],
         weight_std_n: f64 = fit.weight[1],
         mass_kg: f64 = fit.payload().mass,
         mass_std_kg: f64 = fit.payload().mass * fit.weight[1] / fit.weight[0],
-        /// in the axes of the sensor, which of an arm are those of its flange
+        /// in the axes of the sensor; for an arm those of its flange
         centre_mm: Vector = Vector::of(&fit.p_sc, 1e3),
-        /// in the axes of the poses, which of an arm are those of its base
+        /// in the axes of the poses; for an arm those of its base
         gravity_m_per_s2: [f64; 3] = fit.payload().gravity_o.into(),
         bias_force_n: Vector = Vector::of(&fit.bias_force, 1.0),
         bias_torque_nm: Vector = Vector::of(&fit.bias_torque, 1.0),
@@ -278,7 +278,7 @@ impl fmt::Display for PayloadFound {
     }
 }
 
-/// Weight and centre of mass as an arm weighed them.
+/// Weight and centre of mass as measured by an arm.
 #[derive(Clone, Debug, Serialize)]
 pub struct WeighedFound {
     #[serde(flatten)]

@@ -1,4 +1,4 @@
-//! The recordings that a calibration reads.
+//! Recordings for calibrations.
 
 use std::path::{Path, PathBuf};
 
@@ -8,16 +8,16 @@ use touchup_io::recording::{RecordingLayout, StampSource};
 use crate::replay::{Recording, ReplayError, Replayed, each_sample, marker_filter};
 use crate::scene::Scene;
 
-/// A recording made for a calibration, opened.
+/// An open recording for a calibration.
 pub struct CalibrationRecording {
     path: PathBuf,
     recording: Recording,
-    /// of the markers that are read in place of the pose
+    /// topic of the markers that replace the pose
     markers_topic: Option<String>,
 }
 
 impl CalibrationRecording {
-    /// Opens a recording: a file, or a folder of rosbag2.
+    /// Opens a recording: a file, or a rosbag2 folder.
     ///
     /// # Errors
     /// [`ReplayError::Read`]
@@ -32,7 +32,7 @@ impl CalibrationRecording {
         })
     }
 
-    /// How many messages it has, where it says so.
+    /// Number of messages, if the recording states it.
     pub fn message_count(&self) -> Option<u64> {
         self.recording.message_count()
     }
@@ -41,13 +41,13 @@ impl CalibrationRecording {
         &self.path
     }
 
-    /// In which axes the wrenches are, as it says itself.
+    /// Axes of the wrenches, as the recording names them.
     pub(super) fn wrench_frame(&self) -> WrenchFrame {
         self.recording.wrench_frame
     }
 
-    /// Gives each sample to `each`, its pose in the frame of the recording: of the ball where the
-    /// scene says where it is.
+    /// Passes each sample to `each`, its pose in the frame of the recording; a pose of the ball, if
+    /// the scene has the tip offset.
     ///
     /// - `at_each`: called after each record, to show the progress.
     pub(super) fn replay(

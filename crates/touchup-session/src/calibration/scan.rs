@@ -1,4 +1,4 @@
-//! Where the scan lies in space, from points picked on both.
+//! Pose of the scan in space, from points picked on both.
 
 use std::fmt;
 use std::path::Path;
@@ -16,11 +16,10 @@ use super::vector::rounded;
 use crate::reported;
 use crate::scene::{GravityAxes, ScanToSpaceSection, Scene, Setting};
 
-/// From a table of pairs ([`touchup_io::pairs_file`]).
+/// Fits the pose of the scan to a table of pairs ([`touchup_io::pairs_file`]).
 ///
-/// - `recording`: one in which the stylus dwells on each point for a second, in the order of the
-///   table, whose columns of space then do not count; the scene then has to say the radius of the
-///   ball.
+/// - `recording`: dwells of the stylus, one second on each point, in the order of the table; they
+///   replace its columns of space, and the scene must give the radius of the ball.
 /// - `sigma`: standard deviation of a pair per axis, m; `None`: from the residuals.
 /// - `at_each`: called after each record, to show the progress.
 ///
@@ -57,8 +56,7 @@ pub fn calibrate_scan(
     })
 }
 
-/// The points of the table, each with the place where the stylus dwelled, and what the recording
-/// lacks.
+/// The points of the table, each with the position of its dwell, and the losses of the recording.
 fn touched_pairs(
     table: &Path,
     recording: CalibrationRecording,
@@ -67,7 +65,7 @@ fn touched_pairs(
 ) -> Result<(PairsFile, Vec<String>), CalibrationError> {
     let path = recording.path().to_owned();
     let mut file = read_scan_points(table)?;
-    // the poses stay in space: that is what is looked for
+    // the poses stay in space: the pose of the scan is unknown
     let scene = Scene {
         scan_to_space: None,
         ..scene.clone()
@@ -104,8 +102,7 @@ fn touched_pairs(
     Ok((file, replayed.losses))
 }
 
-/// A weight whose direction was named in the axes of the scan may not have been meant for the scan
-/// as it lies now.
+/// A doubt about gravity in the axes of the scan: its direction may not hold for the new pose.
 fn doubt_of_gravity(scene: &Scene) -> Option<String> {
     let payload = scene.compensation.as_ref()?.payload.as_ref()?;
     let is_of_scan = payload.gravity_axes == GravityAxes::Object && payload.payload.mass > 0.0;
@@ -117,16 +114,16 @@ fn doubt_of_gravity(scene: &Scene) -> Option<String> {
 }
 
 reported! {
-    /// Where the scan lies in space.
+    /// Pose of the scan in space.
     #[derive(Clone)]
     pub struct ScanFound, fn of(picked: &[PointPair], names: &[String], fit: &PairsFit) {
         pairs: Vec<PairFound> = names.iter().zip(picked).zip(&fit.residuals).map(PairFound::of).collect(),
         rms_mm: f64 = fit.rms * 1e3,
-        /// of a pair of unit weight, per axis
+        /// standard deviation of a pair of unit weight, per axis
         sigma_mm: f64 = fit.sigma * 1e3,
         /// p_space = R p_scan + t
         scan_to_space: ScanMotion = ScanMotion::of(&fit.motion),
-        /// middle of the pairs in space, for which the shift is given
+        /// centroid of the pairs in space, the reference point of the shift
         centroid_mm: [f64; 3] = (fit.centroid.coords * 1e3).into(),
         shift_std_mm: [f64; 3] = (sigma(fit).fixed_rows::<3>(0) * 1e3).into(),
         turn_std_deg: [f64; 3] = (sigma(fit).fixed_rows::<3>(3) * 1f64.to_degrees()).into(),

@@ -16,7 +16,7 @@ reported! {
         touches: usize = found.touches.len(),
         stiffness_n_per_mm: f64 = found.stiffness()[0] / 1e3,
         std_n_per_mm: f64 = found.stiffness()[1] / 1e3,
-        /// of the places where the spot was touched
+        /// range of the contact positions on the spot
         range_um: f64 = found.range() * 1e6,
     }
 }

@@ -1,5 +1,5 @@
-//! Tip calibration: where the ball is: in the tracked stylus, from a swing about it; in the flange
-//! of an arm, from touches of one flat spot with a probe that leans.
+//! Tip calibration, the centre of the ball: in the tracked stylus, from a swing about it; in the
+//! flange of an arm, from touches of one flat spot with a tilted probe.
 
 use std::fmt;
 
@@ -17,11 +17,10 @@ use super::vector::{Vector, rounded};
 use crate::reported;
 use crate::scene::{Scene, Setting};
 
-/// Poses that are held at most: three minutes at 1 kHz. Of a longer swing every second one is
-/// dropped.
+/// Maximum number of poses: three minutes at 1 kHz. A longer swing loses every second pose.
 const MOST_POSES: usize = 200_000;
 
-/// Every so many-th pose of a swing.
+/// Every `stride`-th pose of a swing.
 struct Swing {
     poses: Vec<SwingPose>,
     stride: usize,
@@ -45,8 +44,8 @@ impl Swing {
     }
 }
 
-/// From a recording in which the ball rests in a cone or divot while the stylus is swung to all
-/// sides.
+/// Fits the tip to a recording of the stylus swung to all sides with the ball at rest in a cone or
+/// divot.
 ///
 /// - `at_each`: called after each record, to show the progress.
 ///
@@ -64,7 +63,7 @@ pub fn calibrate_tip(
         seen: 0,
     };
     let mut scene = scene.clone();
-    // the poses as they are recorded: an older offset does not count
+    // recorded poses, without an older offset
     scene.tip.iter_mut().for_each(|tip| tip.offset = None);
     let replayed = recording.replay(&scene, at_each, |sample| swing.push(sample.pose_ot))?;
     let bad = |error| CalibrationError::Tip { path, error };
@@ -76,7 +75,7 @@ pub fn calibrate_tip(
     })
 }
 
-/// From what an arm measured that touched one flat spot with its probe leaning to all sides.
+/// Fits the tip to touches of an arm on one flat spot, with the probe tilted to all sides.
 ///
 /// # Errors
 /// [`PlaneTipError`]

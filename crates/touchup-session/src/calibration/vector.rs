@@ -1,4 +1,4 @@
-//! Numbers as a calibration shows them, and as it writes them.
+//! Numbers as a calibration shows and writes them.
 
 use std::fmt::{self, Display};
 
@@ -7,8 +7,7 @@ use touchup_core::calibrate::VectorEstimate;
 use crate::reported;
 
 reported! {
-    /// A value of three components as JSON has it, and its standard uncertainty; `unit`: how many
-    /// of it are one of SI.
+    /// A vector and its standard uncertainty, as in JSON; `unit`: units per SI unit.
     #[derive(Clone, Copy)]
     pub(super) struct Vector, pub(super) fn of(known: &VectorEstimate, unit: f64) {
         pub value: [f64; 3] = (known.value * unit).into(),
@@ -32,7 +31,7 @@ impl Display for Vector {
     }
 }
 
-/// As many digits as a scene needs: 1e-7 mm and 1e-10 of the other units are far below any noise.
+/// Rounds to the digits of a scene: 1e-7 mm and 1e-10 of other units are far below any noise.
 pub(super) fn rounded(x: f64, digits: i32) -> f64 {
     let scale = 10f64.powi(digits);
     // no negative zero in a file for people

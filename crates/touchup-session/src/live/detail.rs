@@ -1,5 +1,4 @@
-//! A scan finer than the tip, and the simplified one that haptic update and live patch work on in
-//! its place.
+//! A scan finer than the tip, and its simplified copy for haptic update and live patch.
 
 use std::sync::Arc;
 
@@ -9,17 +8,17 @@ use touchup_core::reconstruct::{PatchDelta, Support};
 
 use super::shown::{Scans, Shown};
 
-/// The scan, and what stands for it.
+/// A fine scan and its simplified copy.
 #[derive(Debug)]
 pub(super) struct Detail {
     scan: OriginalScan,
     simplified: Simplified,
-    /// once somebody looks
+    /// present after [`Self::watch`]
     shown: Option<Shown>,
     rests: u64,
 }
 
-/// Where the scan is.
+/// Owner of the scan.
 #[derive(Debug)]
 enum OriginalScan {
     Own(Box<TriMesh>),
@@ -27,11 +26,11 @@ enum OriginalScan {
 }
 
 impl Detail {
-    /// What the haptic update is to work on, and the detail that it leaves out; a scan that is
-    /// coarse enough is taken as it is.
+    /// Simplifies a scan for the haptic update; returns the working mesh and the detail that it
+    /// leaves out. A coarse scan stays as it is.
     ///
-    /// - `scan`: a copy of `shared`, where that is there.
-    /// - `refine`: the mean edge of its region becomes that of what it works on.
+    /// - `scan`: a copy of `shared`, if there is one.
+    /// - `refine`: the mean edge of its region becomes the mean edge of the working mesh.
     pub fn of(
         scan: TriMesh,
         shared: Option<&Arc<(TriMesh, FaceTree)>>,
@@ -71,31 +70,30 @@ impl Detail {
         }
     }
 
-    /// The scan, moved as what stands for it.
+    /// The scan, moved like the working mesh.
     pub fn moved_as(&self, working: &TriMesh) -> TriMesh {
         self.simplified.carry(self.scan.mesh(), working)
     }
 
-    /// What the live patch works on, with the tree over its faces.
+    /// The simplified scan for the live patch, with the tree over its faces.
     pub fn working_scan(&self) -> Arc<(TriMesh, FaceTree)> {
         let mesh = self.simplified.mesh.clone();
         let tree = FaceTree::new(&mesh);
         Arc::new((mesh, tree))
     }
 
-    /// From here on there is a mesh to look at.
+    /// Starts the shown mesh.
     pub fn watch(&mut self) {
         self.shown = Some(Shown::new(self.scans()));
     }
 
-    /// The mesh to look at, as far as it has followed the working mesh; `None` before
-    /// [`Self::watch`].
+    /// The shown mesh, as it has followed the working mesh; `None` before [`Self::watch`].
     pub fn shown(&self) -> Option<&TriMesh> {
         self.shown.as_ref().map(Shown::mesh)
     }
 
-    /// Changes of the mesh to look at, as [`TriMesh::take_changes`], after up to `most` of the
-    /// working mesh were taken over.
+    /// Changes of the shown mesh, as [`TriMesh::take_changes`], after it takes over up to `most`
+    /// changes of the working mesh.
     ///
     /// # Errors
     /// [`MeshError::TooMany`].
@@ -125,8 +123,8 @@ impl Detail {
         Ok(shown.take_changes(most, into) && has_followed)
     }
 
-    /// The mesh to look at becomes the scan with this patch of all touches so far, as
-    /// [`Self::take_changes`] goes on.
+    /// Turns the shown mesh into the scan with this patch of all touches, by further calls of
+    /// [`Self::take_changes`].
     pub fn rest(&mut self, patch: PatchDelta, refiner: &Refiner) {
         if let Some(shown) = &mut self.shown {
             shown.rest(patch, refiner.mesh());
@@ -134,29 +132,29 @@ impl Detail {
         }
     }
 
-    /// Whether the mesh to look at is, or becomes, what [`Self::rest`] was last called with.
+    /// Whether the shown mesh is, or becomes, the scan with the patch of the last [`Self::rest`].
     pub fn is_resting(&self, refiner: &Refiner) -> bool {
         self.shown
             .as_ref()
             .is_some_and(|shown| shown.rests(refiner.mesh()))
     }
 
-    /// How often [`Self::rest`] was called.
+    /// Number of calls of [`Self::rest`].
     pub fn rests(&self) -> u64 {
         self.rests
     }
 
-    /// The support of a vertex of the mesh to look at; `None`: it is one of the scan.
+    /// The support of a vertex of the shown mesh; `None` for a vertex of the scan.
     pub fn support(&self, refiner: &Refiner, vertex: VertexId) -> Option<Support> {
         self.shown.as_ref()?.support(refiner, vertex)
     }
 
-    /// A face of the mesh to look at that shows a face of the working mesh.
+    /// A face of the shown mesh that shows a face of the working mesh.
     pub fn face(&self, working: FaceId) -> Option<FaceId> {
         self.shown.as_ref()?.face(self.scans(), working)
     }
 
-    /// Memory, bytes; of a scan that is shared its owner counts it.
+    /// Memory, bytes; without a shared scan, which its owner counts.
     pub fn bytes(&self) -> usize {
         let own = if let OriginalScan::Own(scan) = &self.scan {
             scan.bytes()

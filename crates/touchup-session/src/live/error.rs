@@ -3,16 +3,16 @@
 use touchup_core::haptic::RefineError;
 use touchup_core::stylus::SettingError;
 
-/// Why a sample was not taken.
+/// Error of the engine.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum LiveError {
-    /// The haptic update refused it.
+    /// The haptic update refused the sample.
     #[error(transparent)]
     Refine(#[from] RefineError),
     /// A setting outside its range.
     #[error(transparent)]
     Setting(#[from] SettingError),
-    /// The system gives no thread.
+    /// The system provides no thread.
     #[error("no thread for the patch: {0}; end other programs, or leave `patch` out of the scene")]
     NoThread(String),
     /// The thread of the patch ended.

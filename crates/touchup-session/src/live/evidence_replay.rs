@@ -1,9 +1,9 @@
-//! The evidence of samples alone, without a mesh: made again, some samples can be left out.
+//! Evidence of samples without a mesh; rebuilding it can leave out samples.
 
 use touchup_core::reconstruct::{Patcher, PatcherParams};
 use touchup_core::stylus::{ContactEstimator, ContactSample, Sample, SampleError, SettingError};
 
-/// Takes samples as an [`super::Engine`] does, and moves no mesh.
+/// Takes samples like an [`super::Engine`], without moving a mesh.
 #[derive(Clone, Debug)]
 pub struct EvidenceReplay {
     pub(super) contacts: ContactEstimator,
@@ -13,7 +13,7 @@ pub struct EvidenceReplay {
 impl EvidenceReplay {
     /// Nothing touched yet.
     ///
-    /// - `contacts`: that has taken no sample.
+    /// - `contacts`: without any sample.
     ///
     /// # Errors
     /// [`SettingError`] of the patch.
@@ -37,28 +37,27 @@ impl EvidenceReplay {
         Ok(contact)
     }
 
-    /// Takes the last stroke back; returns its touch-down, ns, `None` where there was none.
+    /// Undoes the last stroke; returns its touch-down, ns, or `None` without a stroke.
     pub fn undo(&mut self) -> Option<i64> {
         undo(&mut self.patcher)
     }
 
-    /// Does the stroke again that was taken back last; returns its touch-down, ns, `None` where
-    /// there was none.
+    /// Redoes the last undone stroke; returns its touch-down, ns, or `None` without one.
     pub fn redo(&mut self) -> Option<i64> {
         redo(&mut self.patcher)
     }
 
-    /// What was kept.
+    /// The collected evidence.
     pub fn patcher(&self) -> &Patcher {
         &self.patcher
     }
 
-    /// The kept evidence alone.
+    /// The collected evidence alone.
     pub fn into_patcher(self) -> Patcher {
         self.patcher
     }
 
-    /// Decides about contact.
+    /// The contact estimator.
     pub fn contacts(&self) -> &ContactEstimator {
         &self.contacts
     }

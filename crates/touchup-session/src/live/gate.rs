@@ -5,15 +5,15 @@ use std::time::Instant;
 
 use crate::clock::{Clock, Working, locked};
 
-/// Where each renewal of the patch needs a permit, and whose time waits for the patch. The default
-/// lets everything through.
+/// Demands a permit for each renewal of the patch, and makes the time of a clock wait for the
+/// patch. The default lets everything through.
 #[derive(Clone, Debug, Default)]
 pub struct Gate {
     permits: Option<Arc<Permits>>,
     clock: Clock,
 }
 
-/// Gives permits; dropped, it leaves the gate open.
+/// Gives permits; leaves the gate open when dropped.
 #[derive(Debug)]
 pub struct GateKeeper(Arc<Permits>);
 
@@ -27,12 +27,12 @@ struct Permits {
 struct GateState {
     is_open: bool,
     given: u64,
-    /// renewals that were done with a permit, and whose change can be taken up
+    /// finished renewals with a permit and an available change
     done: u64,
 }
 
 impl Gate {
-    /// Lets everything through. The time of `clock` waits for what the patch was asked.
+    /// Lets everything through. The time of `clock` waits for pending requests to the patch.
     pub fn open(clock: &Clock) -> Self {
         Self {
             permits: None,
@@ -40,7 +40,7 @@ impl Gate {
         }
     }
 
-    /// Lets nothing through without a permit; no time passes for who works behind it.
+    /// Lets nothing through without a permit; the time behind it stands still.
     pub fn kept() -> (Self, GateKeeper) {
         let permits = Arc::new(Permits::default());
         (
@@ -52,17 +52,17 @@ impl Gate {
         )
     }
 
-    /// To be held from a question until its answer is there.
+    /// Stops time from a request until its answer.
     pub(super) fn begin_work(&self) -> Working {
         self.clock.begin_work()
     }
 
-    /// The time of who works behind it.
+    /// The time behind the gate.
     pub(super) fn now(&self) -> Instant {
         self.clock.now()
     }
 
-    /// Returns when a renewal may be worked at.
+    /// Waits for permission to work on a renewal.
     pub(super) fn pass(&self) {
         if let Some(permits) = &self.permits {
             let is_shut = |state: &mut GateState| !state.is_open && state.done == state.given;
@@ -75,7 +75,7 @@ impl Gate {
         }
     }
 
-    /// The change of a renewal can be taken up.
+    /// Notes an available change of a renewal.
     pub(super) fn note_done(&self) {
         if let Some(permits) = &self.permits {
             locked(&permits.state).done += 1;
@@ -85,8 +85,7 @@ impl Gate {
 }
 
 impl GateKeeper {
-    /// Lets one renewal through, and returns when its change can be taken up: one has to be asked
-    /// for.
+    /// Lets one requested renewal through, and returns once its change is available.
     pub fn let_one_through(&self) {
         let mut state = locked(&self.0.state);
         state.given = state.done + 1;

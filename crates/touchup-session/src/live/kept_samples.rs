@@ -1,16 +1,16 @@
-//! The samples that come while the evidence is made again.
+//! Samples that arrive while the evidence is rebuilt.
 
 use touchup_core::stylus::Sample;
 
-/// So many are kept at most: those of 4 minutes at 1 kHz, 29 MB.
+/// Maximum number of kept samples: 4 minutes at 1 kHz, 29 MB.
 const MOST_KEPT: usize = 1 << 18;
 
-/// Samples in their order, or how many there were where they are too many to be kept.
+/// Samples in order, or their number if they exceed the maximum.
 #[derive(Debug)]
 pub(super) struct KeptSamples {
     samples: Vec<Sample>,
     most: usize,
-    /// of more than `most`
+    /// number of all samples, dropped if more than `most`
     dropped: u64,
 }
 
@@ -25,8 +25,8 @@ impl Default for KeptSamples {
 }
 
 impl KeptSamples {
-    /// Keeps a sample. Evidence without some of them would be that of another touch: with one too
-    /// many all are dropped.
+    /// Keeps a sample; beyond the maximum it drops all, as partial evidence would describe another
+    /// touch.
     pub fn push(&mut self, sample: &Sample) {
         if self.dropped > 0 {
             self.dropped += 1;
@@ -38,10 +38,10 @@ impl KeptSamples {
         }
     }
 
-    /// All of them.
+    /// All samples.
     ///
     /// # Errors
-    /// How many were dropped.
+    /// The number of dropped samples.
     pub fn all(&self) -> Result<&[Sample], u64> {
         if self.dropped > 0 {
             Err(self.dropped)

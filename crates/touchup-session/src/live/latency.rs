@@ -1,14 +1,14 @@
-//! How long each sample took: median and tails to 1/64, the longest exactly, in constant memory.
+//! Processing times of samples: median and tails to 1/64, the maximum exactly, in constant memory.
 
 use std::time::Duration;
 
 use serde::Serialize;
 
-/// Bits of a duration that are kept below its highest one: buckets are at most 1/64 wide.
+/// Bits kept below the highest one of a duration: buckets are at most 1/64 wide.
 const KEPT_BITS: u32 = 6;
-/// Durations below this have a bucket each, ns.
+/// Limit of durations with a bucket each, ns.
 const EXACT_BELOW: u64 = 1 << (KEPT_BITS + 1);
-/// Two rows of buckets for the durations that are exact, and one for each higher highest bit.
+/// Two rows of buckets for exact durations, and one for each higher leading bit.
 const BUCKETS: usize = (65 - KEPT_BITS as usize) << KEPT_BITS;
 
 /// A histogram of durations with a relative width of 1/64.
@@ -39,7 +39,7 @@ impl Default for Latencies {
 }
 
 impl Latencies {
-    /// None yet.
+    /// No duration yet.
     pub fn new() -> Self {
         Self {
             buckets: vec![0; BUCKETS].into(),
@@ -48,7 +48,7 @@ impl Latencies {
         }
     }
 
-    /// Adds one.
+    /// Adds a duration.
     pub fn record(&mut self, duration: Duration) {
         let ns = u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX);
         self.buckets[bucket_of(ns)] += 1;
@@ -56,8 +56,7 @@ impl Latencies {
         self.max_ns = self.max_ns.max(ns);
     }
 
-    /// Median and tails: the longest duration of the bucket in which each falls; 0 when there is
-    /// none.
+    /// Median and tails: the longest duration of each one's bucket; 0 without any.
     pub fn quantiles(&self) -> Quantiles {
         Quantiles {
             median: self.at(500),
@@ -142,7 +141,7 @@ mod tests {
         assert_eq!(max, 1000);
     }
 
-    /// So many of a thousand are short that one more or less changes the quantile.
+    /// Numbers of short durations at which one more or less changes a quantile.
     #[test]
     fn a_quantile_is_exceeded_by_its_share_and_no_more() {
         let quantiles = |short: usize| {

@@ -1,13 +1,13 @@
 //! The engine of a session: the haptic update answers every sample at once, the reconstruction (the
 //! patch) follows at its own rate.
 //!
-//! [`Engine`] is all of it, for the node, the command line and the report alike; [`Renewal`] says
-//! when the patch is made: once at the end, or again and again on a thread of its own. Then the
-//! stamps alone decide when it is renewed and at which sample its change is taken up, as long as
-//! the thread keeps up. Where the thread is late the samples go on, and the next renewal takes in
-//! all samples since: the mesh shows a touch later, and the result at the end is the same, as it is
-//! made of all touches at once. With [`Pace::is_patient`] [`Engine::push`] waits instead, and the
-//! mesh at each sample is the same on every machine.
+//! [`Engine`] serves the node, the command line and the report alike; [`Renewal`] sets the time of
+//! the patch: once at the end, or repeatedly on a thread of its own. Then the stamps alone decide
+//! when the patch renews and at which sample the mesh takes up its change, as long as the thread
+//! keeps up. If the thread is late the samples go on, and the next renewal takes in all samples
+//! since: the mesh shows a touch later, and the result at the end is the same, as it uses all
+//! touches at once. With [`Pace::is_patient`] [`Engine::push`] waits instead, and the mesh at each
+//! sample is the same on every machine.
 
 mod detail;
 mod error;
@@ -39,20 +39,20 @@ use touchup_core::reconstruct::{Patcher, PatcherParams, Support};
 use touchup_core::stylus::{BiasParams, ContactSample, Sample};
 use worker::PatchedScans;
 
-/// When the patch of an [`Engine`] is made.
+/// Schedule of the patch of an [`Engine`].
 #[derive(Clone, Debug)]
 pub enum Renewal {
     /// once, of all touches, by [`Engine::finish`]
     AtEnd,
-    /// again and again, on a thread of its own
+    /// repeatedly, on a thread of its own
     Beside {
         /// the scan, with the tree over its faces
         scan: Arc<(TriMesh, FaceTree)>,
-        /// when, in time of the samples
+        /// schedule in time of the samples
         pace: Pace,
         /// memory reserved at the start, in new faces; beyond that it grows, with a pause
         room: usize,
-        /// what each renewal passes
+        /// gate before each renewal
         gate: Gate,
     },
 }
@@ -62,24 +62,24 @@ pub enum Renewal {
 pub struct Engine {
     refiner: Refiner,
     patch: Reconstruction,
-    /// the sample that was answered and not followed
+    /// last sample, answered by [`Self::answer`] and pending for [`Self::follow`]
     answered: Option<ContactSample>,
     /// `None`: the haptic update works on the scan itself
     detail: Option<Detail>,
-    /// of the patch beside the samples
+    /// settings of the patch beside the samples
     patch_params: Option<PatcherParams>,
     /// samples since [`Self::begin_replay`]
     since_replay: Option<KeptSamples>,
-    /// touch-down of the stroke that was taken back or done again last, ns
+    /// touch-down of the last undone or redone stroke, ns
     changed_stroke_ns: Option<i64>,
 }
 
-/// What an [`Engine`] leaves behind.
+/// Final state of an [`Engine`].
 #[derive(Debug)]
 pub struct Ended {
     /// the haptic update after the last sample
     pub refiner: Refiner,
-    /// all that was touched; `None` without a patch
+    /// all touches; `None` without a patch
     pub patcher: Option<Patcher>,
     detail: Option<Detail>,
 }
@@ -87,14 +87,14 @@ pub struct Ended {
 /// Result of an [`Engine`].
 #[derive(Debug)]
 pub enum EngineResult {
-    /// contacts, of which the patch is made
+    /// contacts for the patch
     Touched(Box<Patcher>),
-    /// the scan as the haptic update has moved it: without a patch, or without a contact
+    /// the scan moved by the haptic update: without a patch, or without a contact
     Moved(Box<TriMesh>),
 }
 
 impl Ended {
-    /// The scan as the haptic update alone has moved it.
+    /// The scan moved by the haptic update alone.
     pub fn mesh(&self) -> Cow<'_, TriMesh> {
         let moved = self.refiner.mesh();
         self.detail.as_ref().map_or(Cow::Borrowed(moved), |detail| {
@@ -120,14 +120,14 @@ enum Reconstruction {
 }
 
 impl Engine {
-    /// Nothing touched yet. Where a patch needs the slow drift of the sensor and `refine` names no
-    /// settings for it, it is followed by the default ones, for patch and haptic update alike.
+    /// Starts without touches. If a patch needs the slow drift of the sensor and `refine` has no
+    /// settings for it, patch and haptic update use the default ones.
     ///
     /// - `mesh`: the scan.
-    /// - `patch`: `None`: the haptic update alone; `renewal` is of no use then.
+    /// - `patch`: `None` for the haptic update alone, which ignores `renewal`.
     ///
     /// # Errors
-    /// [`LiveError::Setting`], [`LiveError::Refine`] for settings and where memory is short,
+    /// [`LiveError::Setting`], [`LiveError::Refine`] for settings and short memory,
     /// [`LiveError::NoThread`].
     pub fn new(
         mesh: TriMesh,
@@ -183,22 +183,22 @@ impl Engine {
         })
     }
 
-    /// Takes the next sample and moves the mesh by it, then by the change of the patch that is due:
+    /// Takes the next sample and moves the mesh, then applies the due change of the patch:
     /// [`Self::answer`], then [`Self::follow`].
     ///
     /// # Errors
-    /// Those of [`Refiner::push`], by which nothing is changed, and [`LiveError::Stopped`].
+    /// Those of [`Refiner::push`], which change nothing, and [`LiveError::Stopped`].
     pub fn push(&mut self, sample: &Sample) -> Result<Update, LiveError> {
         let update = self.answer(sample)?;
         self.follow()?;
         Ok(update)
     }
 
-    /// Takes the next sample and moves the mesh by it. What is not due at once is left to
-    /// [`Self::follow`], which is called first where the sample before still needs it.
+    /// Takes the next sample and moves the mesh. Leaves other work to [`Self::follow`], and first
+    /// calls it for a pending earlier sample.
     ///
     /// # Errors
-    /// As [`Self::push`].
+    /// Those of [`Self::push`].
     pub fn answer(&mut self, sample: &Sample) -> Result<Update, LiveError> {
         self.follow()?;
         let update = self.refiner.push(sample)?;
@@ -209,9 +209,8 @@ impl Engine {
         Ok(update)
     }
 
-    /// Does what [`Self::answer`] has left for the time until the next sample: passes the sample to
-    /// the patch, moves the mesh by the change of the patch that is due, and makes ready what the
-    /// next sample is likely to need.
+    /// Does the work left by [`Self::answer`] before the next sample: passes the sample to the
+    /// patch, applies the due change of the patch, and prepares for the likely next sample.
     ///
     /// # Errors
     /// [`LiveError::Stopped`], [`LiveError::Refine`].
@@ -230,8 +229,8 @@ impl Engine {
         Ok(())
     }
 
-    /// To be called now and then while no sample comes: applies more of the changes of the patch,
-    /// and passes it the samples that it does not know yet. Never waits.
+    /// For regular calls while no sample comes: applies more of the changes of the patch, and
+    /// passes new samples to it. Never waits.
     ///
     /// # Errors
     /// [`LiveError::Stopped`], [`LiveError::Refine`].
@@ -244,15 +243,14 @@ impl Engine {
         }
     }
 
-    /// As [`Self::rest`], where the stream has rested for longer: the mesh becomes, bit by bit,
-    /// what [`Patcher::patched`] makes of all samples so far, as a file of the result shows it.
-    /// Returns whether it is that. The next sample may come at any time, and what it changes is as
-    /// if nothing had been settled. Never waits; without a patch beside the samples there is
-    /// nothing to do. Where the haptic update works on a simplified scan, the mesh becomes that by
-    /// [`Self::take_changes`].
+    /// Makes the mesh, after a longer pause of the stream, bit by bit equal to [`Patcher::patched`]
+    /// of all samples, as in a result file; returns whether it is. The next sample may come at any
+    /// time, with the same effect as without settling. Never waits; without a patch beside the
+    /// samples it does nothing. If the haptic update works on a simplified scan, the mesh follows
+    /// by [`Self::take_changes`].
     ///
     /// # Errors
-    /// As [`Self::rest`].
+    /// Those of [`Self::rest`].
     pub fn settle(&mut self) -> Result<bool, LiveError> {
         self.follow()?;
         let Reconstruction::Beside(renewals) = &mut self.patch else {
@@ -265,8 +263,7 @@ impl Engine {
         Ok(is_settled)
     }
 
-    /// Whether the mesh is what a file of all samples so far shows, or becomes so by
-    /// [`Self::take_changes`].
+    /// Whether the mesh equals a result file of all samples, or will by [`Self::take_changes`].
     pub fn is_settled(&self) -> bool {
         match (&self.patch, &self.detail) {
             (Reconstruction::Without, _) => true,
@@ -280,8 +277,8 @@ impl Engine {
         }
     }
 
-    /// Waits until the mesh shows a patch of all samples so far, as after a pause; does nothing
-    /// where the patch is made at the end.
+    /// Waits until the mesh shows a patch of all samples, as after a pause; does nothing for a
+    /// patch at the end.
     ///
     /// # Errors
     /// [`LiveError::Stopped`], [`LiveError::Refine`].
@@ -294,26 +291,26 @@ impl Engine {
         }
     }
 
-    /// Keeps what it takes to undo strokes from here on; a patch keeps it in any case.
+    /// Enables undo of strokes from now on; with a patch it is always possible.
     pub fn keep_strokes(&mut self) {
         if matches!(self.patch, Reconstruction::Without) {
             self.refiner.keep_strokes();
         }
     }
 
-    /// Takes the last stroke back, as [`Patcher::undo`], and waits until the mesh is that of the
-    /// patch before it. Returns whether there was one.
+    /// Undoes the last stroke, as [`Patcher::undo`], and waits until the mesh shows the earlier
+    /// patch. Returns whether there was a stroke.
     ///
     /// # Errors
-    /// As [`Self::catch_up`].
+    /// Those of [`Self::catch_up`].
     pub fn undo(&mut self) -> Result<bool, LiveError> {
         self.change_strokes(Refiner::undo, evidence_replay::undo)
     }
 
-    /// Redoes the last undone stroke, as [`Patcher::redo`]. Returns whether there was anything.
+    /// Redoes the last undone stroke, as [`Patcher::redo`]. Returns whether there was one.
     ///
     /// # Errors
-    /// As [`Self::catch_up`].
+    /// Those of [`Self::catch_up`].
     pub fn redo(&mut self) -> Result<bool, LiveError> {
         self.change_strokes(Refiner::redo, evidence_replay::redo)
     }
@@ -337,15 +334,14 @@ impl Engine {
         Ok(self.changed_stroke_ns.is_some())
     }
 
-    /// Touch-down of the stroke that the last call of [`Self::undo`] or [`Self::redo`] took back or
-    /// did again, ns; `None` where it did nothing, and without a patch.
+    /// Touch-down of the stroke changed by the last [`Self::undo`] or [`Self::redo`], ns; `None` if
+    /// it changed none, and without a patch.
     pub fn changed_stroke_ns(&self) -> Option<i64> {
         self.changed_stroke_ns
     }
 
-    /// Evidence of a patch that is made at the end, once there is a contact, with the
-    /// counts so far: the patch replaces whatever the haptic update would do. `None` before, and
-    /// without such a patch.
+    /// Evidence of a patch at the end, once there is a contact, with the current counts: the patch
+    /// replaces any further haptic update. `None` before, and without such a patch.
     pub fn touched_evidence(&self) -> Option<(EvidenceReplay, RefineCounts)> {
         let counts = *self.refiner.counts();
         let Reconstruction::AtEnd(patcher) = &self.patch else {
@@ -360,10 +356,10 @@ impl Engine {
         })
     }
 
-    /// Begins to make the evidence again beside the samples: what is returned takes all samples so
-    /// far but those to be left out, on any thread, and comes back with [`Self::end_replay`]. Until
-    /// then the samples are kept, as far as there is room for them. `None` without a patch beside
-    /// them.
+    /// Begins to rebuild the evidence beside the samples: the returned replay takes all samples,
+    /// except the ones to leave out, on any thread, and comes back by [`Self::end_replay`]. Until
+    /// then the engine keeps new samples, up to a maximum. `None` without a patch beside the
+    /// samples.
     ///
     /// # Errors
     /// [`LiveError::Stopped`], [`LiveError::Refine`], [`LiveError::Setting`].
@@ -377,12 +373,12 @@ impl Engine {
         Ok(Some(replay))
     }
 
-    /// Evidence and estimates become those of `replay` and of the samples since it was begun, as if
-    /// there had never been others; `None` leaves them. The mesh follows with the next calls, see
+    /// Replaces evidence and estimates by `replay` and the samples since its begin, as if there had
+    /// never been others; `None` leaves them. The mesh follows by the next calls, see
     /// [`Self::is_replacing`]. Never waits for the patch.
     ///
-    /// Returns how many samples came since it was begun where they were too many to be kept: they
-    /// are left as well then. Else 0.
+    /// Returns 0, or the number of samples since the begin if they exceed the maximum: then
+    /// evidence and estimates stay too.
     ///
     /// # Errors
     /// [`LiveError::Stopped`].
@@ -406,15 +402,15 @@ impl Engine {
         renewals.replace(patcher, last_ns).map(|()| 0)
     }
 
-    /// Whether the mesh does not show yet what [`Self::end_replay`] has put in place.
+    /// Whether the mesh does not show the evidence of [`Self::end_replay`] yet.
     pub fn is_replacing(&self) -> bool {
         self.renewals()
             .is_some_and(|renewals| renewals.is_replacing)
     }
 
-    /// A copy of the evidence of the patch from all samples so far, without its results: it comes
-    /// when the thread has made it. [`Patcher::flush`] and [`Patcher::patched`] make of it what
-    /// they would make at the end. `None` without a patch, or where nothing was touched.
+    /// A copy of the evidence of the patch from all samples, without results; the thread sends it
+    /// when ready. [`Patcher::flush`] and [`Patcher::patched`] give the same result as at the end.
+    /// `None` without a patch or a touch.
     ///
     /// # Errors
     /// [`LiveError::Stopped`].
@@ -432,7 +428,7 @@ impl Engine {
         Ok(Some(copy))
     }
 
-    /// Touches that the patch beside the samples has added or removed since the last call.
+    /// Touches that the patch beside the samples added or removed since the last call.
     pub fn take_probed(&mut self) -> Option<TouchDelta> {
         if let Reconstruction::Beside(renewals) = &mut self.patch {
             renewals.take_probed()
@@ -441,17 +437,17 @@ impl Engine {
         }
     }
 
-    /// From here on notes what changes in the mesh, for [`Self::take_changes`].
+    /// Starts to record changes of the mesh for [`Self::take_changes`].
     pub fn watch(&mut self) {
         self.refiner.watch();
         self.detail.iter_mut().for_each(Detail::watch);
     }
 
-    /// Changes of [`Self::mesh`] since the last call, as [`TriMesh::take_changes`]. Where the
-    /// haptic update works on a simplified scan, the mesh follows it by this.
+    /// Changes of [`Self::mesh`] since the last call, as [`TriMesh::take_changes`]. On a simplified
+    /// scan this call makes the mesh follow the haptic update.
     ///
     /// # Errors
-    /// [`LiveError::Refine`] where memory is short.
+    /// [`LiveError::Refine`] if memory is short.
     pub fn take_changes(&mut self, most: usize, into: &mut Changes) -> Result<bool, LiveError> {
         match &mut self.detail {
             None => Ok(self.refiner.take_changes(most, into)),
@@ -461,8 +457,8 @@ impl Engine {
         }
     }
 
-    /// The mesh to look at: that of the haptic update, and where this works on a simplified scan
-    /// and [`Self::watch`] was called, the scan itself as far as it has followed.
+    /// The shown mesh: of the haptic update; on a simplified scan, after [`Self::watch`], the scan
+    /// itself in its current state.
     pub fn mesh(&self) -> &TriMesh {
         self.detail
             .as_ref()
@@ -470,13 +466,13 @@ impl Engine {
             .unwrap_or_else(|| self.refiner.mesh())
     }
 
-    /// How often [`Self::mesh`] was changed since [`Self::watch`], at least: it grows with each
-    /// change to be taken.
+    /// Lower bound on the number of changes of [`Self::mesh`] since [`Self::watch`]: it grows with
+    /// each pending change.
     pub fn edits(&self) -> u64 {
         self.refiner.mesh().edits() + self.detail.as_ref().map_or(0, Detail::rests)
     }
 
-    /// A face of [`Self::mesh`] that shows a face of the haptic update; `None`: it is not shown
+    /// A face of [`Self::mesh`] that shows a face of the haptic update; `None` if there is none
     /// yet.
     pub fn shown_face(&self, face: FaceId) -> Option<FaceId> {
         self.detail
@@ -489,13 +485,13 @@ impl Engine {
         &self.refiner
     }
 
-    /// Whether the mesh is one skin: large changes of the patch are taken up over several samples.
+    /// Whether the mesh is complete: large changes of the patch take several samples.
     pub fn is_whole(&self) -> bool {
         self.renewals().is_none_or(|renewals| renewals.is_done)
     }
 
-    /// Support of a vertex. Where there is no patch, or it does not know yet, a vertex that is not
-    /// where the scan has it counts as touched, or as guessed from touches.
+    /// Support of a vertex. Without a patch, or before it knows, a vertex moved from its scan
+    /// position counts as touched, or as guessed from touches.
     ///
     /// - `scan`: unrefined.
     pub fn support(&self, scan: &TriMesh, vertex: VertexId) -> Support {
@@ -515,8 +511,8 @@ impl Engine {
         }
     }
 
-    /// Stamp up to which the mesh shows all that the patch knows, ns; `None` before the patch has
-    /// seen a touch, and where it is made at the end.
+    /// Stamp up to which the mesh shows all touches of the patch, ns; `None` before its first
+    /// touch, and for a patch at the end.
     pub fn patched_until_ns(&self) -> Option<i64> {
         self.renewals()?.patched_until_ns()
     }
@@ -528,7 +524,7 @@ impl Engine {
             .unwrap_or_default()
     }
 
-    /// Memory of the mesh under refinement, and of the scan that it stands for.
+    /// Memory of the mesh under refinement, and of its full scan.
     pub fn footprint(&self) -> Footprint {
         let working = self.refiner.footprint();
         Footprint {
@@ -537,7 +533,7 @@ impl Engine {
         }
     }
 
-    /// Ends the thread, if there is one; gives back what there is after the last sample.
+    /// Ends the thread, if there is one; returns the state after the last sample.
     ///
     /// # Errors
     /// [`LiveError::Stopped`].

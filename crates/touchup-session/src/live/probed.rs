@@ -1,18 +1,18 @@
-//! The touches that features are measured by, as they come from the thread of the patch.
+//! Touches for the measurement of features, from the thread of the patch.
 
 use touchup_core::stylus::ProbedPoint;
 
-/// Touches that came or went: of a list of touches the first `kept` stay, then come `new`.
+/// Changes of a list of touches: the first `kept` stay, `new` follow.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TouchDelta {
     /// number of earlier touches that stay
     pub kept: usize,
-    /// … and these come after them
+    /// touches after them
     pub new: Vec<ProbedPoint>,
 }
 
 impl Default for TouchDelta {
-    /// All stay and none comes.
+    /// All stay, none is new.
     fn default() -> Self {
         Self {
             kept: usize::MAX,
@@ -22,7 +22,7 @@ impl Default for TouchDelta {
 }
 
 impl TouchDelta {
-    /// Whether nothing came or went.
+    /// Whether nothing changes.
     pub fn is_empty(&self) -> bool {
         self.kept == usize::MAX && self.new.is_empty()
     }
@@ -33,7 +33,7 @@ impl TouchDelta {
             return;
         }
         let ours = self.new.len();
-        // `next` counts from what was there before, with ours behind it
+        // `next` counts from the earlier list, with ours behind it
         match self.kept {
             usize::MAX if ours == 0 => self.kept = next.kept,
             kept if next.kept >= kept => self.new.truncate(next.kept - kept),
@@ -52,11 +52,11 @@ impl TouchDelta {
     }
 }
 
-/// What of a list was published.
+/// The published part of a list.
 #[derive(Debug, Default)]
 pub(super) struct PublishedList {
     count: usize,
-    /// stamp and stroke of the last that was published
+    /// stamp and stroke of the last published touch
     last: Option<(i64, u32)>,
 }
 
@@ -65,7 +65,7 @@ fn name(touch: &ProbedPoint) -> (i64, u32) {
 }
 
 impl PublishedList {
-    /// The message about the current list: the added touches, or the whole list after a removal.
+    /// The message about the current list: the new touches, or the whole list after a removal.
     pub fn changes(&mut self, touches: &[ProbedPoint]) -> TouchDelta {
         let is_longer = self
             .count
@@ -80,7 +80,7 @@ impl PublishedList {
         self.publish(touches, kept)
     }
 
-    /// The message about a list that has another history: all of it.
+    /// The message about a list with another history: all of it.
     pub fn all(&mut self, touches: &[ProbedPoint]) -> TouchDelta {
         self.publish(touches, 0)
     }

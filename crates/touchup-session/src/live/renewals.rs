@@ -1,4 +1,4 @@
-//! A patch that is renewed beside the samples, and how its changes come into the mesh.
+//! Renews a patch beside the samples, and moves its changes into the mesh.
 
 use std::collections::VecDeque;
 use std::sync::mpsc::SyncSender;
@@ -12,37 +12,34 @@ use touchup_core::haptic::Refiner;
 use touchup_core::reconstruct::{PatchDelta, Patcher};
 use touchup_core::stylus::{ContactSample, SettingError};
 
-/// Parts of a change of the patch that are taken up after one sample: some 100 µs on a mesh of a
-/// million faces.
+/// Parts of a change of the patch per sample: some 100 µs on a mesh of a million faces.
 const AT_ONCE: usize = 80;
 
-/// Renewals that are asked for and not taken up at most, where samples do not wait: one that the
-/// thread works at, and one for it to go on with.
+/// Maximum number of open renewals if samples do not wait: one at work in the thread, and one
+/// queued.
 const MOST_OPEN: usize = 2;
 
-/// Where samples do not wait, a renewal is followed by the next when so many times what one takes
-/// have passed: the patch has a quarter of a core, and on a small machine the rest is left to what
-/// answers.
+/// Interval between renewals if samples do not wait, in durations of a renewal: the patch uses a
+/// quarter of a core, and leaves the rest of a small machine to the answers.
 const TIMES_APART: u32 = 4;
-/// A renewal that took longer holds the next no longer up: there are 25 a second, as a
-/// patch far behind leaves more of the mesh to be moved sample by sample.
+/// Cap on the duration that delays the next renewal: at least 25 a second, as a patch far behind
+/// leaves more of the mesh to move sample by sample.
 const LONGEST_WORK: Duration = Duration::from_millis(10);
 
-/// When the patch is renewed, in time of the samples.
+/// Schedule of renewals of the patch, in time of the samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pace {
     /// time from one renewal to the next, ns
     pub every_ns: i64,
-    /// … and from a renewal until its change is taken up, ns: what the thread of the patch has for
-    /// it
+    /// time from a renewal until its change is due, ns: the budget of the thread of the patch
     pub after_ns: i64,
-    /// whether samples wait for a change that is late
+    /// whether samples wait for a late change
     pub is_patient: bool,
 }
 
 impl Default for Pace {
-    /// 8 ms and 10 ms: with a smoothing window of 32 ms to either side, a touch is in the mesh
-    /// after 50 ms, and the time that it takes to take the change up. No sample waits.
+    /// 8 ms and 10 ms: with a smoothing window of 32 ms to either side, the mesh shows a touch
+    /// after 50 ms and the time to take up the change. No sample waits.
     fn default() -> Self {
         Self {
             every_ns: 8_000_000,
@@ -75,14 +72,14 @@ impl Pace {
 pub struct LiveCounts {
     /// renewals taken up
     pub renewals: u64,
-    /// those that were not done when they were due
+    /// renewals not done when due
     pub late: u64,
 }
 
-/// How long the thread of the patch is left alone, in time of the samples.
+/// Pause of the thread of the patch between renewals, in time of the samples.
 #[derive(Debug, Default)]
 struct Rest {
-    /// time of the last renewal
+    /// duration of the last renewal
     took: Duration,
     until_ns: Option<i64>,
 }
@@ -106,27 +103,26 @@ pub(super) struct Renewals {
     pace: Pace,
     /// samples since the last renewal
     batch: Vec<ContactSample>,
-    /// number of the time between two renewals in which the last sample lies
+    /// index of the renewal interval of the last sample
     slot: Option<i64>,
     rest: Rest,
     /// due times of the requested changes, ns
     due_ns: VecDeque<i64>,
-    /// the change that was taken up last …
+    /// the current change
     delta: PatchDelta,
-    /// … and whether all of it is in the mesh
+    /// whether all of the current change is in the mesh
     pub is_done: bool,
-    /// whether another patcher is to be put in place, and the mesh does not show it yet …
+    /// whether another patcher is pending, and the mesh does not show it yet
     pub is_replacing: bool,
-    /// … and whether the change that was taken up last leads to it
+    /// whether the current change leads to that patcher
     has_replaced: bool,
     /// stamp up to which the mesh shows the touches, ns
     patched_until_ns: i64,
-    /// whether the change that is due is known to be late
+    /// whether the due change is known to be late
     is_late: bool,
-    /// whether the mesh is, or becomes with what is open, what the patch of all samples so far
-    /// shows at once
+    /// whether the mesh, with the open renewals, equals the patch of all samples made at once
     is_settled: bool,
-    /// the patch of all touches on the scan that is shown, where that is another, when it has come
+    /// the received patch of all touches on the shown scan, if that is another
     at_rest: Option<PatchDelta>,
     /// touches not yet requested
     probed: TouchDelta,
@@ -162,8 +158,7 @@ impl Renewals {
         })
     }
 
-    /// Takes a sample that the haptic update has taken; moves the mesh by what the patch has found
-    /// that is due by now.
+    /// Takes a sample after the haptic update; applies the due change of the patch.
     pub fn push(&mut self, refiner: &mut Refiner, contact: ContactSample) -> Result<(), LiveError> {
         self.is_settled = false;
         let stamp_ns = contact.tip.stamp_ns;
@@ -189,7 +184,7 @@ impl Renewals {
         self.go_on(refiner, AT_ONCE)
     }
 
-    /// Takes up the change that is due, if it is there or samples wait for it.
+    /// Takes up the due change, if it is available or samples wait for it.
     fn take_up_due(&mut self, refiner: &mut Refiner) -> Result<(), LiveError> {
         let there = self.worker.answer_if_there()?;
         if there.is_none() && !std::mem::replace(&mut self.is_late, true) {
@@ -204,7 +199,7 @@ impl Renewals {
         Ok(())
     }
 
-    /// Takes up some more of the change at hand.
+    /// Takes up a further part of the current change.
     fn go_on(&mut self, refiner: &mut Refiner, most: usize) -> Result<(), LiveError> {
         if !self.is_done {
             self.is_done = refiner.go_on_following(&self.delta, most)?;
@@ -245,13 +240,13 @@ impl Renewals {
         Ok(true)
     }
 
-    /// The patch of all touches on the scan that is shown, once, when it has come and nothing was
-    /// touched since.
+    /// The patch of all touches on the shown scan, once, after its arrival and before further
+    /// touches.
     pub fn take_at_rest(&mut self) -> Option<PatchDelta> {
         self.is_settled().then(|| self.at_rest.take())?
     }
 
-    /// Whether the mesh is what the patch of all samples so far shows at once.
+    /// Whether the mesh equals the patch of all samples made at once.
     pub fn is_settled(&self) -> bool {
         self.is_settled && self.is_done && self.due_ns.is_empty()
     }
@@ -259,7 +254,7 @@ impl Renewals {
     /// As [`super::Engine::catch_up`].
     pub fn catch_up(&mut self, refiner: &mut Refiner) -> Result<(), LiveError> {
         self.ask(i64::MAX)?;
-        // the second time for what was taken in only nearby
+        // the second time for samples first taken in only nearby
         for _ in 0..2 {
             self.worker.ask(Question::Flush)?;
             self.due_ns.push_back(i64::MAX);
@@ -267,8 +262,7 @@ impl Renewals {
         self.take_up_all(refiner).map(drop)
     }
 
-    /// Takes the last stroke back, or does it again, as [`super::Engine::undo`] and
-    /// [`super::Engine::redo`].
+    /// Undoes or redoes a stroke, for [`super::Engine::undo`] and [`super::Engine::redo`].
     pub fn change_strokes(
         &mut self,
         refiner: &mut Refiner,
@@ -281,10 +275,9 @@ impl Renewals {
         self.take_up_all(refiner)
     }
 
-    /// Goes on with another patcher, which has all samples so far; as
-    /// [`super::Engine::end_replay`].
+    /// Continues with another patcher, which has all samples; as [`super::Engine::end_replay`].
     ///
-    /// - `last_ns`: stamp of the last of them, whether or not that is left out.
+    /// - `last_ns`: stamp of the last sample, whether left out or not.
     pub fn replace(&mut self, patcher: Patcher, last_ns: i64) -> Result<(), LiveError> {
         self.batch.clear();
         self.worker
@@ -294,7 +287,7 @@ impl Renewals {
         Ok(())
     }
 
-    /// Passes the samples on, for a change that is to be taken up at `due_ns`.
+    /// Passes the samples on, for a change due at `due_ns`.
     fn ask(&mut self, due_ns: i64) -> Result<(), LiveError> {
         let batch = std::mem::replace(&mut self.batch, self.worker.empty_batch());
         self.worker.ask(Question::Renew(batch))?;
@@ -302,8 +295,7 @@ impl Renewals {
         Ok(())
     }
 
-    /// Takes up all requested changes as a whole; returns the touch-down of the stroke that the
-    /// last one was of.
+    /// Takes up all requested changes; returns the touch-down of the stroke of the last one.
     fn take_up_all(&mut self, refiner: &mut Refiner) -> Result<Option<i64>, LiveError> {
         self.go_on(refiner, usize::MAX)?;
         let mut changed_stroke_ns = None;
@@ -337,7 +329,7 @@ impl Renewals {
         refiner.begin_to_follow(&self.delta);
     }
 
-    /// Requests a copy of the evidence of the patch from all samples so far.
+    /// Requests a copy of the evidence of the patch from all samples.
     pub fn copy_patcher(&self, to: SyncSender<Patcher>) -> Result<(), LiveError> {
         self.worker.ask(Question::Copy(self.batch.clone(), to))
     }
@@ -347,7 +339,7 @@ impl Renewals {
     }
 
     pub fn patched_until_ns(&self) -> Option<i64> {
-        // the least there is before the patch has seen a touch
+        // `i64::MIN` before the first touch in the patch
         Some(self.patched_until_ns).filter(|&until_ns| until_ns > i64::MIN)
     }
 
@@ -360,7 +352,7 @@ impl Renewals {
 mod tests {
     use super::*;
 
-    /// One second of samples, with a renewal asked for at each 8 ms at which that may be.
+    /// One second of samples, with a possible renewal every 8 ms.
     #[test]
     fn long_renewals_are_four_times_what_they_take_apart_or_40_ms() {
         let asked_ms = |took_ms: u64| {

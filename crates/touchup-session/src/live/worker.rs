@@ -16,49 +16,47 @@ use touchup_core::stylus::ContactSample;
 
 /// Requests to the thread.
 pub(super) enum Question {
-    /// take these in, and answer what changed
+    /// take in these samples, and answer the changes
     Renew(Vec<ContactSample>),
-    /// take in what is still in the smoothing window, and answer what changed
+    /// take in the samples of the smoothing window, and answer the changes
     Flush,
-    /// answer what changes where all that was touched so far is reconstructed at once, what is in
-    /// the smoothing window among it; where there is another scan to show, by what this becomes
+    /// answer the changes of a reconstruction of all touches at once, with the samples of the
+    /// smoothing window; for another shown scan, answer its patch instead
     Settle,
     /// copy the evidence, with these further samples
     Copy(Vec<ContactSample>, SyncSender<Patcher>),
-    /// take the last stroke back, or do it again, and answer what changed
+    /// undo or redo the last stroke, and answer the changes
     ChangeStrokes(fn(&mut Patcher) -> Option<i64>),
-    /// go on with another patcher, and answer what changed; the last sample of the one before has
-    /// this stamp, ns
+    /// continue with another patcher, and answer the changes; stamp of the last sample before, ns
     Replace(Box<Patcher>, i64),
 }
 
 /// Answers of the thread.
 pub(super) struct WorkerAnswer {
     pub delta: PatchDelta,
-    /// the patch of all touches on the scan that is shown, where that is another
+    /// the patch of all touches on the shown scan, if that is another
     pub at_rest: Option<PatchDelta>,
     pub probed: TouchDelta,
-    /// touch-down of the stroke that was taken back or done again, if there was one, ns
+    /// touch-down of the undone or redone stroke, if there was one, ns
     pub changed_stroke_ns: Option<i64>,
-    /// whether another patcher was put in place
+    /// whether the answer includes a new patcher
     pub has_replaced: bool,
-    /// how long a renewal keeps the thread busy
+    /// duration of a renewal on the thread
     pub took: Duration,
-    /// to be filled again
+    /// buffer for reuse
     batch: Vec<ContactSample>,
 }
 
 /// The scans of a patch, each with the tree over its faces.
 #[derive(Debug)]
 pub(super) struct PatchedScans {
-    /// what the mesh that follows begins with
+    /// initial state of the working mesh
     pub working: Arc<(TriMesh, FaceTree)>,
-    /// what is shown, where that is another
+    /// the shown scan, if that is another
     pub shown: Option<Arc<(TriMesh, FaceTree)>>,
 }
 
-/// A patcher on a thread of its own. Each request except for a copy has one answer, in the same
-/// order.
+/// A patcher on a thread of its own. Each request but a copy has one answer, in order.
 #[derive(Debug)]
 pub(super) struct Worker {
     gate: Gate,
@@ -82,7 +80,7 @@ impl Worker {
                 working: scan,
                 shown,
             } = scans;
-            // what is farther off is renewed behind the answer, and counts for the next
+            // time of the far renewal after an answer, which counts for the next
             let mut far = Duration::ZERO;
             for (question, _working) in inbox {
                 let (mut batch, mut changed_stroke_ns, mut has_replaced) =
@@ -171,20 +169,20 @@ impl Worker {
         self.batches.pop().unwrap_or_default()
     }
 
-    /// Asks; there will be one answer more.
+    /// Sends a request; one more answer follows.
     pub fn ask(&self, question: Question) -> Result<(), LiveError> {
         self.questions
             .send((question, self.gate.begin_work()))
             .map_err(|_| LiveError::Stopped)
     }
 
-    /// The next answer, when it is there.
+    /// Waits for the next answer.
     pub fn answer(&mut self) -> Result<WorkerAnswer, LiveError> {
         let answer = self.answers.recv().map_err(|_| LiveError::Stopped)?;
         Ok(self.emptied(answer))
     }
 
-    /// The next answer, if it is there.
+    /// The next answer, if available.
     pub fn answer_if_there(&mut self) -> Result<Option<WorkerAnswer>, LiveError> {
         match self.answers.try_recv() {
             Ok(answer) => Ok(Some(self.emptied(answer))),

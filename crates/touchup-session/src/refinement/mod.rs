@@ -1,7 +1,8 @@
-//! A scan refined by a recording, from its first message to the result: `touchup refine`, `probe`
-//! and `demo`, the Python package and sweeps.
+//! Refines a scan by a recording, from first message to result: for `touchup refine`, `probe` and
+//! `demo`, the Python package and sweeps.
 //!
-//! [`refine`] does all of it. [`Refinement`] takes samples one by one and shows the mesh in between.
+//! [`refine`] does all of it. [`Refinement`] takes samples one by one and shows the mesh in
+//! between.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -39,13 +40,13 @@ use offsets::ContactPoints;
 use pace::RealTime;
 use watch::InputWatch;
 
-/// Message for a scene in which nothing moves the mesh.
+/// Message for a scene without an update that moves the mesh.
 pub const NOTHING_MOVES: &str =
     "the scene says `refine: off`, so nothing would move the mesh: take that out of it";
 /// Room reserved for new faces in real time.
 const ROOM: usize = 1 << 18;
 
-/// Why nothing came of a refinement.
+/// Error of a refinement.
 #[derive(Debug, thiserror::Error)]
 pub enum RefinementError {
     /// The scene, or its region on this scan.
@@ -60,7 +61,7 @@ pub enum RefinementError {
     /// The scan.
     #[error(transparent)]
     Scan(#[from] ScanError),
-    /// Topics, frames and stamps that do not go together.
+    /// Inconsistent topics, frames and stamps.
     #[error("{0}")]
     RecordedAs(String),
     /// The recording.
@@ -69,23 +70,23 @@ pub enum RefinementError {
     /// The engine.
     #[error(transparent)]
     Live(#[from] LiveError),
-    /// Something of the recording is surely wrong.
+    /// A sure finding against the recording.
     #[error("{} on {}: {finding}", recording.display(), scan.display())]
     Unsound {
-        /// by its name
+        /// name of the scan
         scan: PathBuf,
-        /// by its name
+        /// name of the recording
         recording: PathBuf,
-        /// the surest
+        /// the surest finding
         finding: Box<InputFinding>,
     },
-    /// Every sample was refused.
+    /// The refinement refused every sample.
     #[error("{}: no sample of it could be used", recording.display())]
     NoSample {
-        /// by its name
+        /// name of the recording
         recording: PathBuf,
     },
-    /// The result cannot be made, or is the scan.
+    /// Making the result fails, or it equals the scan.
     #[error(transparent)]
     Outcome(Box<OutcomeError>),
 }
@@ -101,14 +102,14 @@ impl From<OutcomeError> for RefinementError {
 pub struct RefinementInput {
     /// read and checked
     pub scene: Scene,
-    /// unrefined, without what cannot be touched, with the tree over its faces; m, in O
+    /// unrefined, without its untouchable part, with the tree over its faces; m, in O
     pub scan: Arc<(TriMesh, FaceTree)>,
-    /// what was cut off
+    /// the cut-off part
     pub cut: RegionCut,
 }
 
 impl RefinementInput {
-    /// Cuts the scan as the scene says.
+    /// Cuts the scan to the region of the scene.
     ///
     /// # Errors
     /// [`SceneError::EmptyRegion`]
@@ -128,24 +129,24 @@ impl RefinementInput {
     }
 }
 
-/// Scan and recording of a refinement, opened.
+/// Open scan and recording of a refinement.
 pub struct OpenedInput {
     /// scene and scan
     pub input: RefinementInput,
     /// repairs of the scan's file
     pub repair: RepairReport,
-    /// how the scan came of a point cloud; `None` for a mesh
+    /// reconstruction of the scan from a point cloud; `None` for a mesh
     pub cloud: Option<CloudSummary>,
     /// the touches
     pub recording: Recording,
-    /// makes the poses of a recording of markers
+    /// computes the poses of a recording of markers
     pub markers: Option<MarkerFilter>,
 }
 
 impl OpenedInput {
     /// Opens the files.
     ///
-    /// - `mesh_unit`: of the coordinates in the scan's file.
+    /// - `mesh_unit`: unit of the coordinates in the scan's file.
     ///
     /// # Errors
     /// [`RefinementError::Scan`], [`RefinementError::Scene`], [`RefinementError::Replay`],
@@ -185,19 +186,19 @@ pub struct InputNames<'a> {
     pub recording: &'a Path,
 }
 
-/// How a refinement runs.
+/// Options of a refinement.
 #[derive(Clone, Debug, Default)]
 pub struct RefinementOptions {
-    /// samples come in real time, with the patch beside them; else as fast as they can be read
+    /// whether samples come in real time, with the patch beside them; else as fast as possible
     pub is_live: bool,
-    /// undone, redone, taken out and put back strokes of a session
+    /// undone, redone, excluded and restored strokes of a session
     pub strokes: StrokeChanges,
-    /// estimates the rigid offset of the scan from the touched part; it is not applied
+    /// whether to estimate the rigid offset of the scan from the touched part, without applying it
     pub registration: bool,
-    /// refines an unsound recording, and accepts a result that is the scan
+    /// whether to refine an unsound recording, and accept a result equal to the scan
     pub force: bool,
-    /// the touches lie where the scan may be wrong, as at a hole that it closed: findings that are
-    /// read off the scan are not sure
+    /// whether touches lie at possible flaws of the scan, as at a hole that it closed: findings
+    /// read off the scan are then not sure
     pub touches_flaws: bool,
 }
 
@@ -207,7 +208,7 @@ pub struct Refinement {
     input: RefinementInput,
     options: RefinementOptions,
     stage: Stage,
-    /// of the touchable part of the scan
+    /// the touchable part of the scan
     region: Option<ScanRegion>,
     watch: InputWatch,
     strokes: StrokeReplay,
@@ -217,16 +218,16 @@ pub struct Refinement {
     accepted: u64,
     refused: BTreeMap<String, u64>,
     replayed: Replayed,
-    /// ended before the last sample
+    /// error before the last sample
     stopped: Option<LiveError>,
 }
 
-/// What takes the samples.
+/// Consumer of the samples.
 #[derive(Debug)]
 enum Stage {
     /// each sample moves the mesh
     Moving(Box<Engine>),
-    /// contacts are kept for the patch at the end: it replaces whatever the haptic update would do
+    /// keeps contacts for the patch at the end, which replaces any haptic update
     Keeping {
         evidence: Box<EvidenceReplay>,
         counts: RefineCounts,
@@ -240,12 +241,12 @@ pub struct RefinedScan {
     pub mesh: RefinedMesh,
     /// counts, findings and numbers of the result
     pub summary: RefinementSummary,
-    /// what a better recording would not lack
+    /// losses that a better recording would avoid
     pub losses: Vec<String>,
 }
 
 impl Refinement {
-    /// Nothing touched yet.
+    /// Starts without touches.
     ///
     /// - `wrench_frame`: axes of the wrenches.
     ///
@@ -305,8 +306,7 @@ impl Refinement {
         &self.input
     }
 
-    /// The mesh as the samples so far have moved it; the scan, where the patch at the end is the
-    /// only result.
+    /// The current mesh; the scan, if the patch at the end is the only result.
     pub fn mesh(&self) -> &TriMesh {
         match &self.stage {
             Stage::Moving(engine) => engine.mesh(),
@@ -314,12 +314,12 @@ impl Refinement {
         }
     }
 
-    /// Whether [`Self::finish`] accepts an unsound recording, and a result that is the scan.
+    /// Sets whether [`Self::finish`] accepts an unsound recording, and a result equal to the scan.
     pub fn force(&mut self, force: bool) {
         self.options.force = force;
     }
 
-    /// Counts of the samples so far.
+    /// Counts of all samples.
     pub fn counts(&self) -> &RefineCounts {
         match &self.stage {
             Stage::Moving(engine) => engine.refiner().counts(),
@@ -327,7 +327,7 @@ impl Refinement {
         }
     }
 
-    /// Memory of the mesh that is moved.
+    /// Memory of the moving mesh.
     pub fn footprint(&self) -> Footprint {
         match &self.stage {
             Stage::Moving(engine) => engine.footprint(),
@@ -335,9 +335,9 @@ impl Refinement {
         }
     }
 
-    /// Takes the next sample; a refused one is counted and changes nothing.
+    /// Takes the next sample; counts a refused one, which changes nothing.
     ///
-    /// Returns what it did to the mesh; `None` after a replay of contacts, whose only result is the
+    /// Returns its effect on the mesh; `None` after a replay of contacts, whose only result is the
     /// patch at the end.
     ///
     /// # Errors
@@ -352,7 +352,7 @@ impl Refinement {
 
     /// Takes all samples of a recording.
     ///
-    /// - `markers`: makes the poses of a recording of markers.
+    /// - `markers`: computes the poses of a recording of markers.
     /// - `at_each`: called after each record, to show the progress.
     ///
     /// # Errors
@@ -380,7 +380,7 @@ impl Refinement {
         Ok(())
     }
 
-    /// Takes a sample of a recording when it is due, unless its stroke was taken out.
+    /// Takes a sample of a recording when due, unless the options exclude its stroke.
     fn replay_sample(&mut self, sample: &Sample) {
         self.exchange_strokes(sample.stamp_ns);
         if !self.strokes.takes(sample.stamp_ns) {
@@ -390,7 +390,7 @@ impl Refinement {
             real_time.wait_for(sample.stamp_ns);
         }
         let started = Instant::now();
-        // a refused sample is counted
+        // `take` counts a refused sample
         let _ = self.take(sample);
         self.pushes.record(started.elapsed());
         match (&mut self.real_time, &self.stage) {
@@ -415,7 +415,7 @@ impl Refinement {
                 if matches!(error, LiveError::Refine(_)) {
                     self.refuse(reason_of_refusal(&error));
                 } else {
-                    // nothing that follows changes the mesh
+                    // no later sample changes the mesh
                     self.stopped.get_or_insert_with(|| error.clone());
                 }
                 Err(error)
@@ -437,7 +437,7 @@ impl Refinement {
         }
     }
 
-    /// Judges the recording, and reconstructs what was touched.
+    /// Checks the recording, and reconstructs the touched surface.
     ///
     /// # Errors
     /// [`RefinementError`]
@@ -498,7 +498,7 @@ impl Refinement {
         })
     }
 
-    /// The findings on the recording; an unsound one is refused.
+    /// The findings on the recording; refuses an unsound one.
     fn checked_findings(
         &self,
         names: InputNames<'_>,
@@ -523,7 +523,7 @@ impl Refinement {
     }
 }
 
-/// After the last sample.
+/// State after the last sample.
 struct EndOfSamples {
     result: EngineResult,
     counts: RefineCounts,
@@ -556,8 +556,8 @@ impl Stage {
         }
     }
 
-    /// From the first contact on a patch at the end is the only result: the haptic update, whose
-    /// mesh is the result of a recording without contact, stops.
+    /// Stops the haptic update at the first contact if the patch at the end is the only result; its
+    /// mesh is the result only of a recording without contact.
     fn keep_only_evidence(&mut self) {
         if let Self::Moving(engine) = self
             && let Some((evidence, counts)) = engine.touched_evidence()
@@ -602,7 +602,7 @@ impl Stage {
 }
 
 /// Reason of a refused sample, one word. The synchroniser passes only checked samples, in order of
-/// time, so a sample of a recording is refused where a step has no finite result.
+/// time, so a sample of a recording fails only for a step without a finite result.
 pub fn reason_of_refusal(error: &LiveError) -> &'static str {
     match error {
         LiveError::Refine(RefineError::Sample(_)) => "sample",
@@ -614,7 +614,7 @@ pub fn reason_of_refusal(error: &LiveError) -> &'static str {
 
 /// Refines a scan by a recording.
 ///
-/// - `markers`: makes the poses of a recording of markers.
+/// - `markers`: computes the poses of a recording of markers.
 /// - `at_each`: called after each record, to show the progress.
 ///
 /// # Errors

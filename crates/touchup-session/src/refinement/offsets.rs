@@ -1,5 +1,4 @@
-//! Estimates of clock offset and registration from a replay: reported in the summary, never
-//! applied.
+//! Estimates of clock offset and registration from a replay, for the summary only, never applied.
 
 use std::fmt;
 
@@ -16,21 +15,20 @@ reported! {
     /// Clock offset of the wrench against the pose; never applied automatically.
     #[derive(Clone, Copy)]
     pub struct WrenchOffset, pub fn of(found: &ClockOffset, applied: &SyncParams) {
-        /// total offset: that which the scene applies, and the correction; where there is a drift,
-        /// at the first sample
+        /// total offset, the scene's and the correction; with a drift, at the first sample
         wrench_offset_ms: f64 =
             found.drift.map_or(found.offset, |of| of.offset_at_first) * 1e3 + applied.wrench_offset_ns as f64 * 1e-6,
         /// standard uncertainty
         sigma_ms: f64 = found.sigma * 1e3,
-        /// of that, what the scene applies
+        /// part applied by the scene
         applied_offset_ms: f64 = applied.wrench_offset_ns as f64 * 1e-6,
-        /// total drift: that which the scene applies, and the correction
+        /// total drift, the scene's and the correction
         wrench_drift_ppm: f64 = (found.drift.map_or(0.0, |of| of.rate) + applied.wrench_drift) * 1e6,
-        /// of that, what the scene applies
+        /// part applied by the scene
         applied_drift_ppm: f64 = applied.wrench_drift * 1e6,
-        /// standard uncertainty of the correction; none: no drift is seen
+        /// standard uncertainty of the correction; none without a visible drift
         wrench_drift_sigma_ppm: Option<f64> = found.drift.map(|of| of.rate_sigma * 1e6),
-        /// what it is estimated from
+        /// source of the estimate
         evidence: ClockEvidence = found.evidence,
     }
 }
@@ -96,16 +94,16 @@ reported! {
     #[derive(Clone)]
     /// Shift and turn of the scan with their uncertainties.
     pub struct FoundOffset, fn of(found: &Registration) {
-        /// of the middle of the contacts, and its standard uncertainty
+        /// shift of the centre of the contacts, and its standard uncertainty
         shift_mm: [f64; 3] = three(&found.twist, 0, 1e3),
         shift_sigma_mm: [f64; 3] = three(&sigma(found), 0, 1e3),
-        /// rotation vector about that, and its standard uncertainty
+        /// rotation vector about that centre, and its standard uncertainty
         turn_deg: [f64; 3] = three(&found.twist, 3, 1f64.to_degrees()),
         turn_sigma_deg: [f64; 3] = three(&sigma(found), 3, 1f64.to_degrees()),
         /// surface offset of the scan, outwards
         surface_offset_mm: f64 = found.surface_offset[0] * 1e3,
         surface_offset_sigma_mm: f64 = found.surface_offset[1] * 1e3,
-        /// the middle of the contacts
+        /// centre of the contacts
         centre_mm: [f64; 3] = (found.centre.coords * 1e3).into(),
     }
 }
@@ -119,7 +117,7 @@ fn three(v: &Vector6<f64>, first: usize, unit: f64) -> [f64; 3] {
 }
 
 impl ScanOffset {
-    /// As it is reported.
+    /// The registration as reported.
     pub fn of(found: Result<Registration, RegistrationError>) -> Self {
         match found {
             Ok(found) => Self::Found(FoundOffset::of(&found)),
@@ -163,11 +161,11 @@ impl fmt::Display for ScanOffset {
     }
 }
 
-/// Where the part was touched, for the registration.
+/// Contact points of the part, for the registration.
 #[derive(Debug)]
 pub(super) struct ContactPoints {
     pub registrar: Registrar,
-    /// slower than this the normal of the surface is not known, m/s
+    /// minimum speed for a known surface normal, m/s
     slowest: f64,
     radius: f64,
 }
@@ -200,7 +198,7 @@ impl ContactPoints {
 mod tests {
     use super::*;
 
-    /// 20 ms applied, and 1.5 found beside them.
+    /// 20 ms applied, and 1.5 ms found beside them.
     #[test]
     fn an_offset_that_the_scene_applies_is_told_as_applied() {
         let found = ClockOffset {

@@ -16,7 +16,7 @@ reported! {
         pub behind_ns: Quantiles = behind.quantiles(),
         /// renewals of the patch
         pub renewals: u64 = counts.renewals,
-        /// renewals that were not done when they were due
+        /// renewals not done when due
         pub late: u64 = counts.late,
     }
 }
@@ -44,7 +44,7 @@ pub(super) struct RealTime {
 }
 
 impl RealTime {
-    /// Waits until a sample is due.
+    /// Waits for the due time of a sample.
     pub fn wait_for(&mut self, stamp_ns: i64) {
         let (begun, first_ns) = *self.begun.get_or_insert((Instant::now(), stamp_ns));
         let due =

@@ -15,30 +15,30 @@ use crate::session::{Outcome, UncertaintySummary};
 /// Numbers of a refinement; `push_ns` in ns.
 #[derive(Debug, Serialize)]
 pub struct RefinementSummary {
-    /// wrenches of the recording: each could be a sample
+    /// wrenches of the recording, each a possible sample
     pub samples: u64,
     /// accepted samples
     pub accepted: u64,
     /// refused samples by reason; `pose_…` are lost poses and not samples
     pub refused: BTreeMap<String, u64>,
-    /// times that the stylus came into contact
+    /// number of times that the stylus came into contact
     pub contacts: u64,
-    /// of the markers, where they give the pose
+    /// counts of the markers, if they give the pose
     #[serde(skip_serializing_if = "Option::is_none")]
     pub markers: Option<MarkerCounts>,
-    /// clock offset of the wrench beyond the scene's, where the touches determine it and the scene
-    /// has `clock`
+    /// clock offset of the wrench beyond the scene's, if the touches determine it and the scene has
+    /// `clock`
     #[serde(skip_serializing_if = "Option::is_none")]
     pub wrench_offset: Option<WrenchOffset>,
-    /// rigid offset of the scan from the part, where requested
+    /// rigid offset of the scan from the part, on request
     #[serde(skip_serializing_if = "Option::is_none")]
     pub registration: Option<ScanOffset>,
     /// doubts about the recording, the surest first (`touchup doctor`)
     pub findings: Vec<InputFinding>,
-    /// updates made smaller because a face would have folded; with a patch at the end those before
-    /// the first contact
+    /// updates reduced because a face would fold; with a patch at the end only before the first
+    /// contact
     pub cut_back: u64,
-    /// of the ball on the part; `null` when it never slid far enough
+    /// friction of the ball on the part; `null` if it never slid far enough
     pub friction: Option<FrictionSummary>,
     /// processing time of one sample
     pub push_ns: Quantiles,
@@ -86,7 +86,7 @@ impl RefinementSummary {
     }
 }
 
-/// A line for each further result.
+/// One line per further result.
 impl fmt::Display for RefinementSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let uncertainty = self.outcome.uncertainty.as_ref();

@@ -1,14 +1,14 @@
-//! What watches the input of a refinement.
+//! Watches the input of a refinement.
 
 use touchup_core::diagnose::{InputMonitor, InputMonitorParams};
 use touchup_core::haptic::RefineParams;
 use touchup_core::stylus::{ContactEstimator, ContactSample, Sample, SettingError};
 
-/// Watches messages, samples, and what is decided about their contact.
+/// Watches messages, samples, and decisions on their contact.
 #[derive(Debug)]
 pub(super) struct InputWatch {
     pub monitor: InputMonitor,
-    /// decides where the update takes every sample for contact, which says nothing about it
+    /// decides on contact if the update takes every sample for contact, without a decision
     observer: Option<ContactEstimator>,
 }
 
@@ -27,7 +27,7 @@ impl InputWatch {
 
     /// Notes an accepted sample; returns its contact.
     ///
-    /// - `decided`: what the update has decided about its contact.
+    /// - `decided`: decision of the update on its contact.
     pub fn sample(
         &mut self,
         sample: &Sample,

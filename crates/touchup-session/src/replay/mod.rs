@@ -1,4 +1,4 @@
-//! A recording from its first message to its last, as messages or as samples.
+//! Replays a recording from first to last message, as messages or as samples.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::path::Path;
@@ -18,53 +18,52 @@ mod recorded_as;
 
 pub use recorded_as::RecordedAs;
 
-/// Why a recording was not replayed.
+/// Error of a replay.
 #[derive(Debug, thiserror::Error)]
 pub enum ReplayError {
-    /// The markers, which the scene does not describe.
+    /// The scene lacks a description of the markers.
     #[error("{0}")]
     Markers(String),
     /// The recording is damaged before its first message.
     #[error(transparent)]
     Read(#[from] RecordingError),
-    /// A parameter of the pairing or of the placement.
+    /// A parameter of the pairing or of the placement outside its range.
     #[error(transparent)]
     Setting(#[from] SettingError),
 }
 
-/// Reasons that are gaps in the recording itself; every other one is a lost message.
+/// Reasons for gaps in the recording itself; every other reason is a lost message.
 const NOT_A_LOSS: [&str; 4] = ["gap", "no_pose_before", "no_pose_after", "duplicate"];
 
-/// What a replay found besides its samples.
+/// Findings of a replay besides its samples.
 #[derive(Debug, Default)]
 pub struct Replayed {
-    /// Wrenches of the recording: each could have been a sample.
+    /// Wrenches of the recording, each a possible sample.
     pub wrenches: u64,
-    /// Wrenches that became none, by reason; reasons of lost poses begin with `pose_`.
+    /// Wrenches without a sample, by reason; reasons of lost poses begin with `pose_`.
     pub refused: BTreeMap<String, u64>,
-    /// What a better recording would not lack.
+    /// Losses that a better recording would avoid.
     pub losses: Vec<String>,
-    /// Counts of markers, where they give the pose.
+    /// Counts of markers, if they give the pose.
     pub markers: Option<MarkerCounts>,
 }
 
-/// Messages that are kept at most during the search for the frames: a minute of both topics, 20 MB;
-/// 60 MB with markers.
+/// Maximum number of messages kept during the search for the frames: a minute of both topics, 20
+/// MB; 60 MB with markers.
 const MOST_AHEAD: usize = 100_000;
 
-/// A recording that has been read until the frames of both topics are known, and keeps what it has
-/// read; or messages in memory.
+/// A recording read until the frames of both topics are known, with the messages read; or messages
+/// in memory.
 pub struct Recording {
     reader: Option<RecordingReader>,
     ahead: VecDeque<Result<Record, RecordingError>>,
-    /// In which axes the wrenches are: a header that names the frame of the pose means O, any other
-    /// the stylus' own.
+    /// Axes of the wrenches: O if their header names the frame of the pose, else the stylus' own.
     pub wrench_frame: WrenchFrame,
 }
 
 impl Recording {
-    /// Opens a recording and reads up to the first message of both topics; one that has only one of
-    /// them fails in the replay.
+    /// Opens a recording and reads up to the first message of both topics; a recording with only
+    /// one topic fails in the replay.
     ///
     /// # Errors
     /// [`RecordingError`] of opening it.
@@ -94,9 +93,9 @@ impl Recording {
         })
     }
 
-    /// Messages in memory.
+    /// A recording of messages in memory.
     ///
-    /// - `messages`: of each kind in order of time.
+    /// - `messages`: each kind in order of time.
     /// - `wrench_frame`: axes of the wrenches.
     pub fn of_messages(
         messages: impl IntoIterator<Item = Message>,
@@ -112,7 +111,7 @@ impl Recording {
         }
     }
 
-    /// How many messages it has, where the recording says so.
+    /// Number of messages, if the recording states it.
     pub fn message_count(&self) -> Option<u64> {
         match &self.reader {
             Some(reader) => reader.message_count(),
@@ -120,8 +119,7 @@ impl Recording {
         }
     }
 
-    /// The next pose or wrench; frames of markers are passed over. After damage the error, then
-    /// `None`.
+    /// The next pose or wrench, skipping marker frames. After damage the error, then `None`.
     pub fn next_message(&mut self) -> Option<Result<Message, RecordingError>> {
         loop {
             match self.next()? {
@@ -151,7 +149,7 @@ fn wrench_frame(reader: &RecordingReader) -> WrenchFrame {
     }
 }
 
-/// Where one topic begins long after the other: by a reader of its own, which keeps nothing.
+/// For topics that begin far apart: reads with a reader of its own, which keeps nothing.
 fn find_wrench_frame(path: &Path, layout: &RecordingLayout) -> Result<WrenchFrame, RecordingError> {
     let mut reader = RecordingReader::open(path, layout)?;
     while !knows_frames(&reader) && reader.next_record().is_some() {}
@@ -161,10 +159,10 @@ fn find_wrench_frame(path: &Path, layout: &RecordingLayout) -> Result<WrenchFram
 const NO_MARKERS: &str =
     "--markers-topic needs a scene that says where the markers sit: add `markers:` to it";
 
-/// What makes poses of markers, when the recording has those on `topic`.
+/// The filter that computes poses of markers, if the recording has markers on `topic`.
 ///
 /// # Errors
-/// [`ReplayError::Markers`] when the scene does not say where they sit.
+/// [`ReplayError::Markers`] if the scene gives no positions of the markers.
 pub fn marker_filter(
     scene: &Scene,
     topic: Option<&str>,
@@ -180,13 +178,13 @@ pub fn marker_filter(
         .ok_or_else(|| ReplayError::Markers(NO_MARKERS.to_owned()))
 }
 
-/// Gives each message of `recording` to `each`, in its order.
+/// Passes each message of `recording` to `each`, in order.
 ///
-/// - `markers`: makes the poses of a recording that holds markers.
+/// - `markers`: computes the poses of a recording of markers.
 /// - `at_each`: called after each record, to show the progress.
 ///
 /// # Errors
-/// [`ReplayError::Read`] when the recording is damaged before its first message; later damage is a
+/// [`ReplayError::Read`] if the recording is damaged before its first message; later damage is a
 /// loss.
 pub fn each_message(
     mut recording: Recording,
@@ -224,14 +222,14 @@ pub fn each_message(
     Ok(replayed)
 }
 
-/// Gives each sample of `recording` to `each`, in order of time.
+/// Passes each sample of `recording` to `each`, in order of time.
 ///
 /// - `placement`: brings each message into the frames of the scene.
-/// - `markers`: makes the poses of a recording that holds markers.
-/// - `at_message`: takes each message as it came, before it is placed and paired.
+/// - `markers`: computes the poses of a recording of markers.
+/// - `at_message`: takes each original message, before placement and pairing.
 ///
 /// # Errors
-/// As [`each_message`].
+/// Those of [`each_message`].
 pub fn each_sample(
     recording: Recording,
     placement: Option<Placement>,

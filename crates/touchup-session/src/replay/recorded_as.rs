@@ -1,12 +1,11 @@
-//! Where in a recording poses and wrenches are, by the names that every verb, plan and call has for
-//! it.
+//! Location of poses and wrenches in a recording, by the same names for every verb, plan and call.
 
 use serde::{Deserialize, Serialize};
 
 use crate::scene::Scene;
 use touchup_io::recording::{RecordingLayout, StampSource, Topics, TransformFrames};
 
-/// Where they are; what is not named is where it usually is.
+/// Location of poses and wrenches; unnamed ones have their usual place.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct RecordedAs {
@@ -30,7 +29,7 @@ pub struct RecordedAs {
     pub stamp: Option<String>,
 }
 
-/// Topic of the transforms, where no other is named.
+/// Topic of the transforms, unless another is named.
 const TRANSFORMS: &str = "/tf";
 
 impl RecordedAs {
@@ -38,7 +37,7 @@ impl RecordedAs {
         *self == Self::default()
     }
 
-    /// What is named, and the columns of a table that the scene names.
+    /// The named topics and frames, and the table columns that the scene names.
     pub fn layout(&self, scene: &Scene) -> RecordingLayout {
         let own = Topics::default();
         let pose = if self.pose_frame.is_some() {
@@ -65,7 +64,7 @@ impl RecordedAs {
     /// Which time of a message counts.
     ///
     /// # Errors
-    /// Where it is no word for one, and where what is named does not go together.
+    /// If it is no known word, and if names contradict each other.
     pub fn checked_stamps(&self) -> Result<StampSource, String> {
         if self.base_frame.is_some() && self.pose_frame.is_none() {
             return Err("base_frame is the frame in which the pose of pose_frame is wanted: name pose_frame".to_owned());

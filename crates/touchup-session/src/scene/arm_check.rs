@@ -1,4 +1,4 @@
-//! The record of `touchup check`, and what is to be said of it when the arm probes.
+//! The record of `touchup check`, and its doubts at the time of probing.
 
 use std::fmt;
 use std::io;
@@ -9,51 +9,51 @@ use chrono::{DateTime, SecondsFormat, Utc};
 use serde::{Deserialize, Serialize};
 use touchup_io::session_folder::read_text;
 
-/// Version of the files that are written and read.
+/// Version of the file format.
 const VERSION: u32 = 1;
-/// A check counts for temperatures no farther from its own, K.
+/// Maximum temperature difference at which a check counts, K.
 const LARGEST_TEMPERATURE_CHANGE: f64 = 5.0;
-/// Clocks of two machines may differ by this, days.
+/// Maximum difference between the clocks of two machines, days.
 const CLOCKS: f64 = 1.0;
 const DAY_S: f64 = 86_400.0;
 
-/// What a check of an arm found, as it is kept.
+/// The stored findings of a check of an arm.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CheckRecord {
-    /// of the file
+    /// version of the file
     pub version: u32,
-    /// when it was made
+    /// time of the check
     #[serde(with = "rfc3339")]
     pub date: DateTime<Utc>,
-    /// `robot.model`, with the name of its file where that is a URDF
+    /// `robot.model`, with the file name of a URDF
     pub robot_model: String,
-    /// of the cell, °C, where it was named
+    /// temperature of the cell, °C, if given
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub temperature_c: Option<f64>,
-    /// whether all gates were kept
+    /// whether all gates passed
     pub passed: bool,
-    /// the gates that were not, in words
+    /// failed gates, in words
     #[serde(default)]
     pub failures: Vec<String>,
-    /// what else should be looked at, in words
+    /// further doubts, in words
     #[serde(default)]
     pub warnings: Vec<String>,
     /// standard deviation of one touch
     pub repeatability_mm: f64,
-    /// numbers that it is known by
+    /// degrees of freedom of `repeatability_mm`
     pub repeatability_degrees_of_freedom: usize,
-    /// standard deviation of a place along each axis for each metre from `registered_at_mm`
+    /// standard deviation of a position along each axis, per metre from `registered_at_mm`
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub growth_mm_per_m: Option<f64>,
-    /// effective radius of the ball …
+    /// effective radius of the ball
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tip_radius_mm: Option<f64>,
-    /// … and its standard uncertainty
+    /// standard uncertainty of the radius
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tip_radius_sigma_mm: Option<f64>,
 }
 
-/// A date as RFC 3339 has it, in seconds.
+/// A date in RFC 3339, in seconds.
 mod rfc3339 {
     use chrono::{DateTime, SecondsFormat, Utc};
     use serde::de::Error;
@@ -76,24 +76,24 @@ mod rfc3339 {
     }
 }
 
-/// Why a record is not usable.
+/// Error of a check record.
 #[derive(Debug, thiserror::Error)]
 pub enum CheckRecordError {
-    /// It cannot be read.
+    /// The file is unreadable.
     #[error("cannot read the record of the check {path}: {source}", path = path.display())]
     Read {
-        /// which file
+        /// the file
         path: PathBuf,
-        /// what the system says
+        /// error of the system
         source: io::Error,
     },
-    /// It is none.
+    /// The file is no check record.
     #[error(
         "{path} is no record of `touchup check`: {why}; write a new one (robot.check of the scene names it; take that key out, or the \
          file away, to check by this scene)", path = path.display()
     )]
     Damaged {
-        /// which file
+        /// the file
         path: PathBuf,
         /// in words
         why: String,
@@ -101,7 +101,7 @@ pub enum CheckRecordError {
 }
 
 impl CheckRecord {
-    /// A record that says nothing but when, and of which arm; the rest is filled in.
+    /// A record with date and arm only; the check fills in the rest.
     pub fn new(now: SystemTime, robot_model: &str, temperature_c: Option<f64>) -> Self {
         Self {
             version: VERSION,
@@ -119,7 +119,7 @@ impl CheckRecord {
         }
     }
 
-    /// Reads a record; `None` where there is no such file.
+    /// Reads a record; `None` if there is no such file.
     ///
     /// # Errors
     /// [`CheckRecordError`]
@@ -177,63 +177,63 @@ impl CheckRecord {
         Ok(record)
     }
 
-    /// Whether its numbers are those of this model of an arm.
+    /// Whether its numbers belong to this model of an arm.
     pub(super) fn is_of(&self, robot_model: &str) -> bool {
         self.robot_model == robot_model
     }
 }
 
-/// What the user has to know of the check of an arm.
+/// Doubt about the check of an arm, for the user.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CheckDoubt {
-    /// The scene names none.
+    /// The scene names no record.
     #[error(
         "none: robot.check of the scene names no record of `touchup check`, so the uncertainties are what the scene tells"
     )]
     NotNamed,
-    /// The file is not there.
+    /// The file is missing.
     #[error("none: {} is not there; `touchup check --out` writes it", .0.display())]
     Missing(
-        /// which file
+        /// the file
         PathBuf,
     ),
-    /// It did not pass.
+    /// The check failed.
     #[error("failed: {0}")]
     Failed(
         /// the gates, in words
         String,
     ),
-    /// It is too old.
+    /// The check is too old.
     #[error("too old: {days:.0} days, robot.check_days is {most}")]
     Old {
-        /// its age
+        /// age of the check
         days: f64,
-        /// as the scene has it
+        /// maximum age in the scene
         most: f64,
     },
-    /// It is of a time to come.
+    /// The date of the check is in the future.
     #[error("dated {days:.0} days from now: set the clock of this machine")]
     InFuture {
-        /// from now
+        /// days from now
         days: f64,
     },
-    /// It is of another arm; its numbers are not used.
+    /// The check belongs to another arm; its numbers do not count.
     #[error("of another arm: {checked}, this one is {model}, so its numbers are not used")]
     OtherModel {
-        /// as the record has it
+        /// model in the record
         checked: String,
-        /// as the scene has it
+        /// model in the scene
         model: String,
     },
-    /// The temperature has changed.
+    /// The temperature differs.
     #[error("made at {checked_c:.1} °C, it is {now_c:.1} °C now")]
     OtherTemperature {
-        /// of the check
+        /// temperature of the check
         checked_c: f64,
         /// now
         now_c: f64,
     },
-    /// What was found beside the gates.
+    /// A finding besides the gates.
     #[error("{0}")]
     Warned(
         /// in words
@@ -241,20 +241,20 @@ pub enum CheckDoubt {
     ),
 }
 
-/// The record of the check that the scene names, and how far it can be relied on.
+/// The check record that the scene names, and the doubts about it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CheckStanding {
-    /// `None`: there is none
+    /// `None` without a record
     pub record: Option<CheckRecord>,
-    /// at the time of the results, days
+    /// age at the time of the results, days
     pub age_days: Option<f64>,
-    /// empty: it is relied on
+    /// empty if the check is reliable
     pub doubts: Vec<CheckDoubt>,
 }
 
 impl CheckStanding {
-    /// - `file`: that the scene names, `record`: what is in it; `most_days`: for which it counts;
-    ///   `temperature_c`: of the cell now.
+    /// - `file`: named in the scene, `record`: its content; `most_days`: maximum age;
+    ///   `temperature_c`: present temperature of the cell.
     pub(super) fn of(
         (file, record): (Option<&Path>, Option<&CheckRecord>),
         robot_model: &str,
@@ -298,7 +298,7 @@ impl CheckStanding {
         }
     }
 
-    /// Its doubts in words.
+    /// The doubts in words.
     pub fn doubts(&self) -> Vec<String> {
         self.doubts.iter().map(ToString::to_string).collect()
     }
@@ -337,8 +337,8 @@ mod tests {
 
     const DAY: Duration = Duration::from_secs(86_400);
 
-    /// 2026-03-01T00:00:00Z, by hand: 20 454 days after 1970-01-01 (56 years of 365 days, 14 leap
-    /// days, 31 + 28).
+    /// 2026-03-01T00:00:00Z, computed by hand: 20 454 days after 1970-01-01 (56 years of 365 days,
+    /// 14 leap days, 31 + 28).
     fn made() -> SystemTime {
         SystemTime::UNIX_EPOCH + DAY * (56 * 365 + 14 + 31 + 28)
     }

@@ -1,5 +1,4 @@
-//! What a scene costs: the parts that are built of it, those that are left out and why, and the
-//! memory that is taken at start.
+//! Cost of a scene: active parts, inactive parts with reasons, and memory at start.
 
 use std::fmt;
 
@@ -9,22 +8,21 @@ use super::{Mode, Scene};
 use crate::reported;
 use touchup_core::haptic::Footprint;
 
-/// Parts by their names in the YAML, in its order; then what the program was built with, by
-/// feature.
+/// Parts by their YAML names, in YAML order, then the features of the program.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Built {
-    /// there, and paid for
+    /// active parts, with their cost
     pub built: Vec<&'static str>,
-    /// neither allocated nor run
+    /// parts neither allocated nor run
     pub left_out: Vec<LeftOut>,
 }
 
-/// A part that is not built.
+/// An inactive part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct LeftOut {
-    /// by its name in the YAML
+    /// YAML name
     pub part: &'static str,
-    /// why: the scene, its mode, or the task at hand
+    /// reason: the scene, its mode, or the task at hand
     pub reason: &'static str,
 }
 
@@ -36,18 +34,18 @@ const NO_PATCH: &str = "of the patch, which is left out";
 const NOT_COMPILED: &str = "not in this build of touchup";
 
 reported! {
-    /// Memory at start, MB of 10⁶ bytes, of what was just built; `scan_bytes`: of the unrefined
-    /// scan, with the trees over it. What was touched comes to it.
+    /// Memory at start, MB of 10⁶ bytes; `scan_bytes`: of the unrefined scan, with the trees over
+    /// it. Touches add to it.
     #[derive(Clone, Copy, PartialEq)]
     pub struct Memory, pub fn of(refiner: Footprint, scan_bytes: usize) {
-        /// the mesh that is moved: positions, faces, adjacency, where each vertex was scanned, the
-        /// normal measured on each face
+        /// the moving mesh: positions, faces, adjacency, scanned position of each vertex, measured
+        /// normal of each face
         pub mesh_mb: f64 = refiner.mesh as f64 / 1e6,
         /// the tree over its faces
         pub tree_mb: f64 = refiner.tree as f64 / 1e6,
-        /// the unrefined scan, with a tree of its own where the patch is made beside the samples
+        /// the unrefined scan, with a tree of its own for a patch beside the samples
         pub scan_mb: f64 = scan_bytes as f64 / 1e6,
-        /// what the mesh keeps of a patch that it follows; 0 where there is none
+        /// part of the mesh for the patch that it follows; 0 without one
         pub patch_mb: f64 = refiner.patch as f64 / 1e6,
     }
 }
@@ -64,10 +62,10 @@ pub struct SceneCost {
 }
 
 impl Scene {
-    /// What is built of the scene, and why the rest is not.
+    /// Active parts of the scene, and the reasons of the inactive ones.
     ///
-    /// - `unused`: parts that the task at hand has no use for, each with the reason.
-    /// - `features`: those that the program can be built with, and whether it was.
+    /// - `unused`: parts without use for the task at hand, each with the reason.
+    /// - `features`: optional features of the program, and whether this build has them.
     #[expect(clippy::too_many_lines)]
     pub fn built(&self, unused: &[LeftOut], features: &[(&'static str, bool)]) -> Built {
         let unless = |is_there: bool, reason| if is_there { None } else { Some(reason) };
@@ -137,7 +135,7 @@ impl Scene {
     }
 }
 
-/// Those that are left out stand together by their reason.
+/// Groups inactive parts by reason.
 impl fmt::Display for Built {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let list = |names: &[&str]| {

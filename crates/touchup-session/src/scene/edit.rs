@@ -1,8 +1,7 @@
-//! Settings put into the text of a scene; comments, order and everything else stay as they were
-//! written.
+//! Edits settings in the text of a scene; comments, order and everything else stay as written.
 //!
-//! Only the lines of the keys that are set are touched. The result is verified: the new text must
-//! parse to exactly the scene that is expected, or it is refused.
+//! Only the lines of edited keys change. The edit verifies its result: the new text must parse to
+//! exactly the expected scene, or the edit fails.
 
 mod block;
 mod flow;
@@ -40,13 +39,12 @@ impl Setting {
 impl Scene {
     /// The text of a scene with `settings` in it.
     ///
-    /// - `yaml`: the scene as it was; empty for a new one.
-    /// - `remark`: goes behind the first key that is set, where no comment of the user does; one
-    ///   line.
-    /// - `expected`: what the new text must parse to.
+    /// - `yaml`: the earlier text; empty for a new scene.
+    /// - `remark`: comment after the first edited key, unless the user has one there; one line.
+    /// - `expected`: the scene that the new text must parse to.
     ///
     /// # Errors
-    /// [`SceneError::CannotEdit`] when the result would not be the expected scene.
+    /// [`SceneError::CannotEdit`] if the result would not be the expected scene.
     pub fn edited(
         yaml: &str,
         settings: &[Setting],
@@ -82,8 +80,8 @@ impl Scene {
         }
     }
 
-    /// The remark that [`Self::edited`] left behind a key in the text of a scene, without `first`,
-    /// which it begins with; of whichever section has it first.
+    /// The remark of [`Self::edited`] after a key in the text of a scene, without its beginning
+    /// `first`; from the first section with such a remark.
     pub fn remark<'a>(yaml: &'a str, key: &str, first: &str) -> Option<&'a str> {
         let (key, begin) = (format!("{key}:"), format!("{} {first}", block::MARK));
         let mut of_key = yaml

@@ -1,14 +1,14 @@
-//! What can be wrong with a scene.
+//! Errors of a scene.
 
 use std::path::PathBuf;
 
 use touchup_core::stylus::SettingError;
 use touchup_io::file_error::FileError;
 
-/// Why a scene is not usable.
+/// Error of an unusable scene.
 #[derive(Debug, thiserror::Error)]
 pub enum SceneError {
-    /// The file cannot be read.
+    /// The file is unreadable.
     #[error(transparent)]
     Read(#[from] FileError),
     /// Not YAML, an unknown key, or a value of the wrong kind.
@@ -22,18 +22,18 @@ pub enum SceneError {
     /// A value outside its range.
     #[error(transparent)]
     Setting(#[from] SettingError),
-    /// The description of the arm.
+    /// Error of the arm's description.
     #[error(transparent)]
     Urdf(#[from] touchup_io::urdf::UrdfError),
-    /// The record of its check.
+    /// Error of the arm's check record.
     #[error(transparent)]
     Check(#[from] super::CheckRecordError),
-    /// No face of the scan is near the region that is touched.
+    /// No face of the scan is near the touched region.
     #[error(
         "no face of the scan is in or near scan.region_low_mm to scan.region_high_mm; is scan.unit right?"
     )]
     EmptyRegion,
-    /// A key that another one needs is not there.
+    /// A key needs another key, which is missing.
     #[error("{key} needs {needs}: name both or neither")]
     Incomplete {
         /// section, key and value
@@ -41,23 +41,23 @@ pub enum SceneError {
         /// section and key
         needs: &'static str,
     },
-    /// A part cannot be built without another one.
+    /// A part needs another part, which is missing.
     #[error("{part} needs {needs}: name it, or say `{part}: off`")]
     Unmet {
-        /// by its name
+        /// name of the part
         part: &'static str,
         /// section, or section and key
         needs: &'static str,
     },
-    /// Neither a flag nor the scene tells the radius of the ball.
+    /// Neither a flag nor the scene gives the radius of the ball.
     #[error(
         "the radius of the ball is not known: give --tip-radius-mm, or tip.radius_mm in the scene (`touchup init` writes one)"
     )]
     NoRadius,
-    /// A file whose form cannot be edited without harm to the rest of it.
+    /// The form of the file does not allow an edit without harm to the rest.
     #[error("the scene cannot be edited ({why}); put this in by hand: {settings}")]
     CannotEdit {
-        /// what prevents it
+        /// reason
         why: String,
         /// keys and values
         settings: String,
@@ -65,9 +65,9 @@ pub enum SceneError {
     /// The error of one file.
     #[error("{path}: {error}", path = path.display())]
     In {
-        /// which file
+        /// the file
         path: PathBuf,
-        /// what is wrong in it
+        /// its error
         error: Box<SceneError>,
     },
 }
@@ -75,7 +75,7 @@ pub enum SceneError {
 /// The parser's text for programmers.
 const FOR_PROGRAMMERS: &str = ", set DuplicateKeyPolicy in Options if acceptable";
 
-/// One line with the place, and the nearest known key where one is misspelt.
+/// One line with the position, and the nearest known key for a misspelt one.
 pub(crate) fn yaml_error(error: &serde_saphyr::Error) -> SceneError {
     let plain = error.without_snippet();
     let hint = match plain {
@@ -95,10 +95,10 @@ pub(crate) fn yaml_error(error: &serde_saphyr::Error) -> SceneError {
     }
 }
 
-/// The known word that fewest insertions, deletions, replacements and swaps turn `word` into, when
-/// that is at most half of it.
+/// The known word with the fewest insertions, deletions, replacements and swaps from `word`, if
+/// they are at most half its length.
 pub fn nearest<'a>(word: &str, known: &[&'a str]) -> Option<&'a str> {
-    // such a name is no typing mistake, and the distance costs the product of both lengths
+    // a longer name is no typing mistake, and the distance costs the product of both lengths
     const LONGEST: usize = 64;
     let edits = |key: &&str| strsim::osa_distance(word, key);
     let near = known

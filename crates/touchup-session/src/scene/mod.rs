@@ -1,11 +1,9 @@
-//! The YAML that names the parts of a scene and their parameters, turned into the modules' own
-//! settings.
+//! The YAML of a scene: its parts and their parameters, converted to the settings of the modules.
 //!
-//! A scene says what differs: what a right result needs is built unless the scene says `off`, as in
-//! `patch: off`; what only some sensors need is built where it is named. A part without keys takes
-//! its defaults. Each parameter is declared once, by [`touchup_core::parameters!`], in the module
-//! that it belongs to; `config/default.yaml` is [`Scene::template`] and docs/scene.md is
-//! [`Scene::table`].
+//! A scene gives differences only: the parts of a right result are active unless the scene says
+//! `off`, as in `patch: off`; parts for some sensors only are active if named. A part without keys
+//! has its defaults. [`touchup_core::parameters!`] declares each parameter once, in its own module;
+//! `config/default.yaml` is [`Scene::template`] and docs/scene.md is [`Scene::table`].
 
 mod arm_check;
 mod built;
@@ -116,7 +114,7 @@ impl Scene {
         Self::read_with_text(path).map(|(scene, _)| scene)
     }
 
-    /// The columns of a table, as far as they are named.
+    /// The named columns of a table.
     pub fn table_columns(&self) -> TableColumns {
         self.columns.clone().unwrap_or_default()
     }
@@ -124,7 +122,7 @@ impl Scene {
     /// Reads and checks a scene, and keeps its text for [`Self::edited`].
     ///
     /// # Errors
-    /// As [`Self::read`].
+    /// Those of [`Self::read`].
     pub fn read_with_text(path: &Path) -> Result<(Self, String), SceneError> {
         let yaml = read_text(path)?;
         let in_file = |error| SceneError::In {
@@ -140,8 +138,8 @@ impl Scene {
         Ok((scene, yaml))
     }
 
-    /// Whether the text of a scene gives a value to the key of a section; of a text that is no
-    /// scene, `false`.
+    /// Whether the text of a scene gives a value to the key of a section; `false` for an invalid
+    /// text.
     pub fn names(yaml: &str, section: &str, key: &str) -> bool {
         let Ok(scene) = serde_saphyr::from_str::<serde_json::Value>(yaml) else {
             return false;
@@ -152,13 +150,13 @@ impl Scene {
             .is_some_and(|value| !value.is_null())
     }
 
-    /// Takes the radius of the ball from who told it: a flag, or else the text of the scene. The
-    /// default is nobody's word.
+    /// Sets the radius of the ball from a flag, or else checks that the text of the scene gives it.
+    /// The default does not count.
     ///
     /// - `yaml`: text of the scene; empty for none.
     ///
     /// # Errors
-    /// [`SceneError::NoRadius`] where nobody did.
+    /// [`SceneError::NoRadius`] if neither gives it.
     pub fn tell_radius(&mut self, yaml: &str, radius_mm: Option<f64>) -> Result<(), SceneError> {
         match radius_mm {
             Some(radius_mm) => self.tip.get_or_insert_default().ball.radius = radius_mm / 1e3,
@@ -171,7 +169,7 @@ impl Scene {
 
     /// The scan that the scene names, and the unit of its coordinates.
     ///
-    /// - `path`: of the scene.
+    /// - `path`: path of the scene.
     pub fn scan_file(&self, path: &Path) -> Option<(PathBuf, MeshUnit)> {
         let scan = self.scan.as_ref()?;
         let folder = path.parent().unwrap_or(Path::new(""));
@@ -192,14 +190,14 @@ impl Scene {
     /// # Ok::<(), touchup_session::scene::SceneError>(())
     /// ```
     pub fn from_yaml(yaml: &str) -> Result<Self, SceneError> {
-        // comments between a key and its value are held, and there are few places for them
+        // the parser keeps comments between a key and its value, in few slots
         let scene: Self = serde_saphyr::from_str(yaml).map_err(|error| yaml_error(&error))?;
         scene.validate()?;
         Ok(scene)
     }
 
-    /// Checks every range, and what one part asks of another; to be called again after a flag
-    /// changed a value.
+    /// Checks every range and the dependencies between parts; call it again after a flag changes a
+    /// value.
     ///
     /// # Errors
     /// [`SceneError::Setting`], [`SceneError::Incomplete`].

@@ -1,4 +1,4 @@
-//! Sections of the YAML turned into the settings of the modules.
+//! Converts sections of the YAML to the settings of the modules.
 
 use std::collections::BTreeMap;
 
@@ -31,14 +31,14 @@ impl Scene {
         })
     }
 
-    /// Where recorded messages belong; `None` when they are as the rooms take them.
+    /// Placement of recorded messages in the frames of the scene; `None` if none is necessary.
     pub fn placement(&self) -> Option<Placement> {
         let pose_wo = self.scan_to_space.as_ref().map(ScanToSpaceSection::pose_wo);
         let p_ht = self.tip.as_ref().and_then(|tip| tip.offset);
         (pose_wo.is_some() || p_ht.is_some()).then_some(Placement { pose_wo, p_ht })
     }
 
-    /// The robot cell, and how is probed in it; `None` without `robot`.
+    /// The robot cell and its probing parameters; `None` without `robot`.
     pub fn probing(&self) -> Option<(Cell, ProbeParams)> {
         let (
             robot,
@@ -91,7 +91,7 @@ impl Scene {
         ))
     }
 
-    /// The filter that makes poses of markers, if there is one.
+    /// The filter that computes poses of markers, if there is one.
     ///
     /// # Errors
     /// [`SettingError`] for markers on one line, or closer together than the gate allows.
@@ -102,7 +102,7 @@ impl Scene {
         MarkerFilter::new(markers.body()?, markers.params).map(Some)
     }
 
-    /// Settings of the compensator for a wrench that arrives in the axes of `wrench_frame`.
+    /// Settings of the compensator for a wrench in the axes of `wrench_frame`.
     pub fn compensator_params(&self, wrench_frame: WrenchFrame) -> CompensatorParams {
         let Some(CompensationSection {
             payload,
@@ -134,7 +134,7 @@ impl Scene {
         }
     }
 
-    /// What the input is taken for, with a wrench that arrives in the axes of `wrench_frame`.
+    /// Settings of the input monitor for a wrench in the axes of `wrench_frame`.
     pub fn input_monitor_params(&self, wrench_frame: WrenchFrame) -> InputMonitorParams {
         let has_gate = self
             .refine
@@ -151,7 +151,7 @@ impl Scene {
         }
     }
 
-    /// The ball; a rigid point when the scene says `tip: off`.
+    /// The ball; a rigid point for `tip: off`.
     pub fn tip_params(&self) -> TipParams {
         self.tip.as_ref().map_or(
             TipParams {
@@ -162,20 +162,19 @@ impl Scene {
         )
     }
 
-    /// Which tip touches.
+    /// The shape of the tip.
     pub fn tip_shape(&self) -> TipShape {
         self.tip
             .as_ref()
             .map_or(TipShape::Ball, TipSection::tip_shape)
     }
 
-    /// Standard deviation of the scan, m; 0 when the scene says `scan: off`.
+    /// Standard deviation of the scan, m; 0 for `scan: off`.
     fn scan_noise(&self) -> f64 {
         self.scan.as_ref().map_or(0.0, |scan| scan.quality.noise)
     }
 
-    /// Settings of the refiner for a wrench that arrives in the axes of `wrench_frame`; `None`
-    /// without `refine`.
+    /// Settings of the refiner for a wrench in the axes of `wrench_frame`; `None` without `refine`.
     pub fn refine_params(&self, wrench_frame: WrenchFrame) -> Option<RefineParams> {
         let section = self.refine.as_ref()?;
         let mut params = match section.mode {
@@ -201,7 +200,7 @@ impl Scene {
         Some(params)
     }
 
-    /// Whether the touched surface is reconstructed; the published rule moves triangles alone.
+    /// Whether the scene reconstructs the touched surface; the published rule only moves triangles.
     pub(super) fn has_patch(&self) -> bool {
         self.patch.is_some()
             && self
@@ -210,14 +209,14 @@ impl Scene {
                 .is_none_or(|refine| refine.mode == Mode::Robust)
     }
 
-    /// Settings of the patcher; `None` without `patch` or `contact`, and in the mode of the paper.
+    /// Settings of the patcher; `None` without `patch` or `contact`, and in paper mode.
     pub fn patcher_params(&self) -> Option<PatcherParams> {
         let PatchParams { tolerance } = self
             .patch
             .filter(|_| self.has_patch() && self.contact.is_some())?;
         let (shape, TipParams { radius, stiffness }, noise) =
             (self.tip_shape(), self.tip_params(), self.scan_noise());
-        // a tip that cannot be is refused by the patcher
+        // the patcher refuses an impossible tip
         let mut params = PatcherParams::for_tip(shape, radius, stiffness, noise)
             .unwrap_or_else(|_| PatcherParams::new(radius, stiffness, noise));
         params.touches.shape = shape;
@@ -237,7 +236,7 @@ impl Scene {
 }
 
 impl RefineSection {
-    /// What the scene says itself, over what the mode has.
+    /// Overrides the settings of the mode by those of the scene.
     fn override_mut(&self, params: &mut RefineParams) {
         let dynamics = &mut params.dynamics;
         dynamics.model = match (self.contact_model, dynamics.model, params.tip.stiffness) {
@@ -268,7 +267,7 @@ impl RefineSection {
     }
 }
 
-/// A simulated arm of a cell; all that a scene does not name is as in [`ArmParams::default`].
+/// A simulated arm of a cell; other settings are those of [`ArmParams::default`].
 pub fn simulated_arm(cell: &Cell, params: &ProbeParams) -> ArmParams {
     ArmParams {
         geometry: cell.geometry.clone(),

@@ -1,5 +1,4 @@
-//! A scene in which only a region of the scan is ever touched: the rest gets no adjacency and no
-//! tree.
+//! Region of the scan for all touches: the rest gets no adjacency and no tree.
 
 use super::{Scene, SceneError};
 use touchup_core::haptic::{RefineParams, RoiSize, ScanRegion};
@@ -7,35 +6,34 @@ use touchup_core::mesh::{Outside, Region, TriMesh};
 use touchup_core::reconstruct::PatcherParams;
 use touchup_core::stylus::WrenchFrame;
 
-/// A touch changes the patch within so many sizes of the tip: the fit of the touches reaches two,
-/// free space another one …
+/// Reach of a touch in the patch, in tip sizes: the fit of the touches reaches two, free space one
+/// more.
 const TIPS: f64 = 4.0;
-/// … and so many cells of its lattice more, in which the surface is filled in.
+/// Additional reach in lattice cells, for the fill-in of the surface.
 const CELLS: f64 = 6.0;
-/// Around what changes so many edges are needed: the faces around the ring around a face.
+/// Margin around changes, in edges: the faces around the ring around a face.
 const EDGES: f64 = 4.0;
 
-/// The scan as it is worked on.
+/// The touchable part of a scan, and its cut.
 #[derive(Clone, Debug)]
 pub struct CutScan {
-    /// what can be touched, and what that needs around it; the scan itself where the scene names no
-    /// region
+    /// the touchable part with its margin; the whole scan if the scene names no region
     pub mesh: TriMesh,
-    /// what was cut off
+    /// the cut-off part
     pub cut: RegionCut,
 }
 
-/// What a scene's region leaves out.
+/// The part of the scan outside a scene's region.
 #[derive(Clone, Debug, Default)]
 pub struct RegionCut {
-    /// the rest of the scan; `None` where the scene names no region
+    /// the rest of the scan; `None` if the scene names no region
     pub outside: Option<Outside>,
     haptic: Option<ScanRegion>,
     patch: Option<Region>,
 }
 
 impl Scene {
-    /// The box that is touched, where the scene names one.
+    /// The touchable box, if the scene names one.
     pub fn region(&self) -> Option<Region> {
         let scan = self.scan.as_ref()?;
         Some(Region {
@@ -44,11 +42,10 @@ impl Scene {
         })
     }
 
-    /// Takes out of the scan what is touched, with what the haptic update and the patch need around
-    /// it.
+    /// Cuts the touchable part out of the scan, with the margin of haptic update and patch.
     ///
     /// # Errors
-    /// [`SceneError::EmptyRegion`] where no face is near.
+    /// [`SceneError::EmptyRegion`] if no face is near.
     pub fn cut(&self, scan: TriMesh) -> Result<CutScan, SceneError> {
         let Some(region) = self.region() else {
             return Ok(CutScan {
@@ -77,9 +74,9 @@ impl Scene {
         })
     }
 
-    /// How far around the region a touch in it can change anything, m.
+    /// Maximum distance from the region at which a touch in it changes anything, m.
     fn margin(&self, mean_edge: f64) -> f64 {
-        // which axes the wrench has changes no length
+        // the axes of the wrench change no length
         let haptic = self.refine_params(WrenchFrame::default());
         let patch = self.patcher_params();
         let of_update = haptic.map_or(0.0, |params| {
@@ -89,7 +86,7 @@ impl Scene {
                 0.0
             };
             let furthest = params.largest_move_edges * mean_edge;
-            // the paper bounds no move: its handle is where the tip is
+            // the paper bounds no move: its handle is at the tip
             let furthest = if furthest.is_finite() && params.largest_move_edges < f64::MAX {
                 furthest
             } else {
@@ -110,7 +107,7 @@ impl RegionCut {
         self.outside.as_ref().map_or(0, Outside::bytes)
     }
 
-    /// Settings that keep to the region.
+    /// Settings of the haptic update restricted to the region.
     pub fn refine_params(&self, params: RefineParams) -> RefineParams {
         RefineParams {
             region: self.haptic,
@@ -118,7 +115,7 @@ impl RegionCut {
         }
     }
 
-    /// Settings that keep to the region.
+    /// Settings of the patch restricted to the region.
     pub fn patcher_params(&self, params: PatcherParams) -> PatcherParams {
         PatcherParams {
             region: self.patch,

@@ -1,5 +1,4 @@
-//! The sections of the YAML that are no struct of one module of the method: each is what a scene
-//! says of one thing.
+//! Sections of the YAML that correspond to no single struct of the method.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -95,13 +94,13 @@ parameters! {
 }
 
 words! {
-    /// In which axes gravity is named.
+    /// Axes of the gravity vector.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
     pub enum GravityAxes {
-        /// Those of the scan: it must be named again when the part is laid down otherwise.
+        /// Axes of the scan: name gravity again after each new placement of the part.
         #[default]
         Object = "object",
-        /// Those of the recorded poses: `scan_to_space` turns it.
+        /// Axes of the recorded poses: `scan_to_space` turns it.
         Space = "space",
     }
 }
@@ -121,7 +120,7 @@ parameters! {
 }
 
 words! {
-    /// Which tip touches.
+    /// Shape of the tip.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
     pub enum ShapeName {
         /// A ball.
@@ -154,12 +153,11 @@ parameters! {
     }
 }
 
-/// Length of a tip that the scene does not name, in diameters, and for a sharp cone no less than
-/// this, m.
+/// Default length of a tip, in diameters; at least the second number, m, for a sharp cone.
 const USUAL_LENGTH: (f64, f64) = (2.0, 5e-3);
 
 impl TipSection {
-    /// The shape; that of a cone without an angle is none.
+    /// The shape of the tip; a cone without an angle is invalid.
     pub(super) fn tip_shape(&self) -> TipShape {
         let TipSizes {
             edge_radius,
@@ -239,7 +237,7 @@ words! {
 }
 
 words! {
-    /// What force the scan lets expect.
+    /// Model of the expected contact force.
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
     pub enum ModelName {
         /// `f_max_n`, `h_min_mm`, `delta` (Eq 3).
@@ -287,7 +285,7 @@ parameters! {
 }
 
 words! {
-    /// Which arm it is.
+    /// Model of the arm.
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
     pub enum ArmModel {
         /// UR3e
@@ -415,9 +413,9 @@ impl RobotSection {
         self.touch.check_within(&self.limits)
     }
 
-    /// Reads the description of an arm that is no UR.
+    /// Reads the URDF of an arm other than a UR.
     ///
-    /// - `folder`: of the scene.
+    /// - `folder`: folder of the scene.
     pub(super) fn read_urdf(&mut self, folder: &Path) -> Result<(), UrdfError> {
         let Some(file) = self.urdf.as_ref().filter(|_| self.model == ArmModel::Urdf) else {
             return Ok(());
@@ -431,9 +429,9 @@ impl RobotSection {
         Ok(())
     }
 
-    /// Reads the record of its check, where there is one.
+    /// Reads the record of the arm's check, if the scene names one.
     ///
-    /// - `folder`: of the scene.
+    /// - `folder`: folder of the scene.
     pub(super) fn read_check(&mut self, folder: &Path) -> Result<(), CheckRecordError> {
         let Some(file) = &self.check else {
             return Ok(());
@@ -442,7 +440,7 @@ impl RobotSection {
         Ok(())
     }
 
-    /// Its model; of a URDF also which.
+    /// Name of the model; for a URDF with its file.
     pub fn model_name(&self) -> String {
         match &self.urdf {
             Some(file) if self.model == ArmModel::Urdf => {
@@ -452,9 +450,9 @@ impl RobotSection {
         }
     }
 
-    /// What stands in each result of the check of the arm.
+    /// Check record of the arm and its doubts, for each result.
     ///
-    /// - `now`: of a clock of the date.
+    /// - `now`: present date and time.
     pub fn check_standing(&self, now: SystemTime) -> CheckStanding {
         let named = (self.check.as_deref(), self.check_record.as_ref());
         CheckStanding::of(
@@ -466,16 +464,16 @@ impl RobotSection {
         )
     }
 
-    /// The record of the check, where it is one of this arm.
+    /// The record of the check, if it belongs to this arm.
     fn own_check(&self) -> Option<&CheckRecord> {
         self.check_record
             .as_ref()
             .filter(|record| record.is_of(&self.model_name()))
     }
 
-    /// What is wanted of a feature, with what a check of the arm has found: of repeatability and
-    /// growth the larger of measured and told, for a check of few touches can be lucky, and what a
-    /// maker states can be.
+    /// Pattern parameters with the findings of the arm's check: the larger of measured and stated
+    /// repeatability and growth, as a check of few touches may be lucky, and a maker's statement
+    /// too.
     pub(super) fn checked_pattern(&self) -> PatternParams {
         let Some(record) = self.own_check() else {
             return self.pattern;
@@ -493,7 +491,7 @@ impl RobotSection {
         }
     }
 
-    /// The tip in the flange.
+    /// Pose of the tip in the flange.
     pub(super) fn pose_ft(&self) -> Isometry3<f64> {
         Isometry3::from_parts(
             self.tip_position.into(),
@@ -502,7 +500,7 @@ impl RobotSection {
     }
 }
 
-/// The quaternion x, y, z, w that turns nothing.
+/// Identity quaternion x, y, z, w.
 pub(super) const NO_TURN: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
 
 pub(super) fn unit_quaternion([x, y, z, w]: [f64; 4]) -> UnitQuaternion<f64> {

@@ -1,5 +1,5 @@
-//! What is written from the definition of the parameters: the scene with every key explained, and
-//! the table of them.
+//! Texts from the definition of the parameters: the scene with every key explained, and the table
+//! of all keys.
 
 use touchup_core::parameters::{Parameter, Section};
 
@@ -21,14 +21,13 @@ where the scene says `off`, as in `patch: off`. Parts that are off in the defaul
 their defaults. A number outside its range is refused by its key, an unknown key with its line and column.
 ";
 
-/// Letters of a line of comment at most.
+/// Maximum number of letters in a line of comment.
 const WIDTH: usize = 118;
-/// Spaces that a new level is set in by.
+/// Spaces per level.
 const STEP: usize = 2;
 
 impl Scene {
-    /// [`Scene::default`] as YAML, with every key explained; what is left out is there as a
-    /// comment.
+    /// [`Scene::default`] as YAML, with every key explained; inactive keys are comments.
     pub fn template() -> String {
         Self::parameters()
             .iter()
@@ -37,7 +36,7 @@ impl Scene {
             })
     }
 
-    /// The same without the radius of the ball, which nobody has told yet.
+    /// The template without the radius of the ball, which the user has yet to give.
     pub fn template_without_radius() -> String {
         Self::template().replace("\n  radius_mm: ", "\n  #radius_mm: ")
     }
@@ -50,7 +49,7 @@ impl Scene {
     }
 }
 
-/// A key with its comment, and what is in it.
+/// A key with its comment and its inner keys.
 fn explained(parameter: &Parameter, indent: usize, is_off: bool) -> String {
     let Parameter {
         key,
@@ -78,7 +77,7 @@ fn explained(parameter: &Parameter, indent: usize, is_off: bool) -> String {
     })
 }
 
-/// What it does, and the words to choose from.
+/// The summary of a key, with its allowed words.
 fn with_words(parameter: &Parameter) -> String {
     let summary = parameter.summary();
     if parameter.words.is_empty() {
@@ -91,7 +90,7 @@ fn with_words(parameter: &Parameter) -> String {
     )
 }
 
-/// In lines of `width` letters at most.
+/// Wraps a text at `width` letters.
 fn wrapped(text: &str, width: usize) -> Vec<String> {
     let mut lines: Vec<String> = vec![];
     for word in text.split(' ') {
@@ -105,7 +104,7 @@ fn wrapped(text: &str, width: usize) -> Vec<String> {
     lines
 }
 
-/// A section as a table, and those in it.
+/// A section as a table, then its inner sections.
 fn rows(section: &Parameter) -> String {
     let built = if section.default.is_some() {
         ""

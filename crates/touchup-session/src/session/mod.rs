@@ -1,8 +1,8 @@
 //! One run of touching a part: its result and its files.
 //!
-//! [`Outcome`] is what `touchup refine` and the node write alike: the refined mesh, the features on
-//! it, the touches they rest on. [`SessionRecord`] keeps in a folder all that it takes to get the
-//! same again, up to the last moment before a crash.
+//! [`Outcome`] describes the common result of `touchup refine` and the node: the refined mesh, its
+//! features, and their touches. [`SessionRecord`] keeps in a folder everything to reproduce the
+//! result, up to the last moment before a crash.
 
 mod outcome;
 mod outliers;

@@ -23,13 +23,13 @@ use touchup_io::mesh_file::{read_mesh, write_mesh_with};
 use touchup_io::result_table::{ResultTableError, write_features_as_named, write_touches_as_named};
 use touchup_io::touches_file::as_written;
 
-/// Why a result was not written.
+/// Error of writing a result.
 #[derive(Debug, thiserror::Error)]
 pub enum OutcomeError {
     /// The mesh.
     #[error("{0}")]
     WriteMesh(MeshFileError),
-    /// The mesh that was just written.
+    /// The mesh just written.
     #[error("{0}")]
     ReadMesh(MeshFileError),
     /// The touches or the features.
@@ -38,7 +38,7 @@ pub enum OutcomeError {
     /// The patch is too large.
     #[error(transparent)]
     Mesh(#[from] MeshError),
-    /// The result would be the scan, or the scan and something beside it.
+    /// The result would be the scan, possibly with something beside it.
     #[error("no face of the scan is moved or replaced: the touches are not on it")]
     Unchanged,
     /// Many contacts contradict each other.
@@ -46,33 +46,33 @@ pub enum OutcomeError {
     Contradictory(String),
 }
 
-/// Where a result goes.
+/// Output files of a result.
 #[derive(Clone, Copy, Debug)]
 pub struct OutcomePlaces<'a> {
     /// the refined mesh
     pub mesh: &'a Path,
-    /// unit of its coordinates, and of those of the scan
+    /// unit of its coordinates, and of the scan's
     pub unit: MeshUnit,
-    /// the file of the scan: its colours and texture coordinates are carried over
+    /// the file of the scan, source of colours and texture coordinates
     pub scan: &'a Path,
-    /// features of the refined mesh, measured by the touches: a table where the name ends in `.csv`
-    /// or `.parquet`, else JSON
+    /// features of the refined mesh, measured by the touches: a table for a name in `.csv` or
+    /// `.parquet`, else JSON
     pub features: Option<&'a Path>,
-    /// the touches that features name: Parquet where the name ends so, else CSV
+    /// the touches of the features: Parquet for a name in `.parquet`, else CSV
     pub touches: Option<&'a Path>,
 }
 
 /// Result on the touched part.
 #[derive(Debug, Serialize)]
 pub struct Outcome {
-    /// faces that are not where the scan had them
+    /// faces off their position in the scan
     pub moved_faces: u64,
-    /// what was remeshed; `null` when the scene has no `patch`, or nothing was touched
+    /// the remeshed part; `null` if the scene has no `patch`, or without touches
     pub patch: Option<PatchSummary>,
-    /// how well that is known; not there when the scene has no `uncertainty`
+    /// uncertainty of that part; absent if the scene has no `uncertainty`
     #[serde(skip_serializing_if = "Option::is_none")]
     pub uncertainty: Option<UncertaintySummary>,
-    /// vertices and faces of the mesh that was written
+    /// vertices and faces of the written mesh
     #[serde(skip)]
     pub counts: [usize; 2],
 }
@@ -80,19 +80,18 @@ pub struct Outcome {
 reported! {
     /// The patch in the report.
     pub struct PatchSummary, pub fn of(patched: &Patched, seconds: f64) {
-        /// how far the new faces may be from the surface that the touches show
+        /// maximum distance of the new faces from the surface of the touches
         tolerance_mm: f64 = patched.tolerance * 1e3,
-        /// whether that is more than usual: so much was touched by so small a tip that the lattice
-        /// of the usual one would not have fitted
+        /// whether the tolerance exceeds the usual one, as the lattice of a large area with a small
+        /// tip would not fit
         is_coarser: bool = patched.is_coarser,
-        /// faces of the scan that went
+        /// removed faces of the scan
         removed_faces: usize = patched.removed_faces,
-        /// faces that came
+        /// added faces
         added_faces: usize = patched.added_faces,
-        /// vertices of the scan that were moved to where they were touched, with the detail between
-        /// them
+        /// vertices of the scan moved to the touches, with the detail between them
         moved_vertices: usize = patched.moved_vertices,
-        /// share of the new vertices that rest on contacts nearby, not there
+        /// share of the new vertices that rest on nearby contacts, not their own
         guessed_share: f64 = guessed_share(&patched.support),
         /// time of the reconstruction, s
         pub build_s: f64 = seconds,
@@ -109,14 +108,14 @@ fn guessed_share(support: &[Support]) -> f64 {
     guessed / (touched + guessed).max(1.0)
 }
 
-/// Features of a mesh and the touches on it, also as a file has them.
+/// Features of a mesh and its touches, also as a file.
 pub fn found(mesh: &TriMesh, touches: &[ProbedPoint]) -> (Detection, FeatureFile) {
     let detection = detect(mesh, touches);
     let file = FeatureFile::of(&detection.features, detection.unexplained);
     (detection, file)
 }
 
-/// Faces that are new, or of which a corner is not where it was.
+/// Faces that are new, or with a moved corner.
 pub fn moved_faces(before: &TriMesh, after: &TriMesh) -> u64 {
     let is_moved = |v: VertexId| before.position(v) != after.position(v);
     let is_as_scanned = |face: FaceId, corners: [VertexId; 3]| {
@@ -130,19 +129,19 @@ pub fn moved_faces(before: &TriMesh, after: &TriMesh) -> u64 {
         .count() as u64
 }
 
-/// For each vertex of a refined mesh its place in the scan, m in O; `None` where it is new.
+/// For each vertex of a refined mesh its position in the scan, m in O; `None` for a new vertex.
 pub type Origins = Vec<Option<Point3<f64>>>;
 
-/// Where each vertex of a refined mesh was in the scan.
+/// Position in the scan of each vertex of a refined mesh.
 pub fn origins(scan: &TriMesh, refined: &TriMesh) -> Origins {
     (0..refined.vertex_slots())
         .map(|vertex| scan.positions().get(vertex).copied())
         .collect()
 }
 
-/// A remeshed part with the rest of its scan, and the places of its vertices in the scan.
+/// A remeshed part sewn to the rest of its scan, and the scan positions of its vertices.
 ///
-/// - `of_scan`: standard deviation of a vertex that was not touched, m.
+/// - `of_scan`: standard deviation of an untouched vertex, m.
 ///
 /// # Errors
 /// [`MeshError::TornRim`], [`MeshError::TooMany`].
@@ -171,7 +170,7 @@ pub fn sewn(
     ))
 }
 
-/// Vertices and faces in a file of the mesh: a vertex that no face uses is not in it.
+/// Vertices and faces in a file of the mesh, which omits vertices without a face.
 fn written_counts(mesh: &TriMesh) -> [usize; 2] {
     let is_used = |vertex: &u32| {
         mesh.has_vertex(VertexId(*vertex)) && !mesh.star(VertexId(*vertex)).is_empty()
@@ -182,20 +181,20 @@ fn written_counts(mesh: &TriMesh) -> [usize; 2] {
     ]
 }
 
-/// A refined mesh before it is written, whole: with the rest of a scan of which a part was refined.
+/// A whole refined mesh before writing, with the rest of a partly refined scan.
 #[derive(Debug)]
 pub struct RefinedMesh {
     /// m, in O
     pub mesh: TriMesh,
-    /// for each vertex its place in the scan
+    /// scan position of each vertex
     pub origins: Origins,
     /// the support of each vertex; none without a patch
     pub support: Vec<Support>,
     /// standard deviation of each vertex along the normal, m; none without a patch or `uncertainty`
     pub sigma: Vec<f64>,
-    /// columns of a file of it, in its units
+    /// vertex columns of its file, in file units
     pub columns: Vec<VertexColumn>,
-    /// the touches that features are measured by
+    /// touches for the measurement of features
     pub touches: Vec<ProbedPoint>,
 }
 
@@ -212,8 +211,8 @@ impl RefinedMesh {
     ///
     /// - `scan`: unrefined, with the tree over its faces.
     /// - `outside`: the rest of the scan.
-    /// - `must_change`: whether a result that is the scan, or whose contacts contradict each other,
-    ///   is refused.
+    /// - `must_change`: whether to refuse a result equal to the scan, or with contradictory
+    ///   contacts.
     ///
     /// # Errors
     /// [`OutcomeError::Unchanged`], [`OutcomeError::Contradictory`], [`OutcomeError::Mesh`].
@@ -229,7 +228,7 @@ impl RefinedMesh {
         }
     }
 
-    /// A mesh without patch.
+    /// A mesh without a patch.
     fn moved(
         scan: &TriMesh,
         refined: TriMesh,
@@ -265,7 +264,7 @@ impl RefinedMesh {
         Ok((refined, outcome))
     }
 
-    /// The touched part of the scan remeshed.
+    /// The scan with its touched part remeshed.
     fn patched(
         (scan, tree): &(TriMesh, FaceTree),
         mut patcher: Patcher,
@@ -327,7 +326,7 @@ impl RefinedMesh {
 }
 
 impl Outcome {
-    /// What was lost of the contacts; `None` where hardly any was.
+    /// Loss of contacts; `None` if small.
     pub fn loss(&self) -> Option<String> {
         self.uncertainty.as_ref()?.loss()
     }
@@ -371,8 +370,8 @@ impl OutcomePlaces<'_> {
             .map_err(OutcomeError::WriteMesh)
     }
 
-    /// Writes the touches and the features of the result, where requested: of the mesh and by the
-    /// touches as they are written, so that `touchup features` finds the same to the last bit.
+    /// Writes the requested touches and features of the result: from the written mesh and touches,
+    /// so `touchup features` finds the same to the last bit.
     fn write_features(&self, touches: &[ProbedPoint]) -> Result<(), OutcomeError> {
         if let Some(out) = self.touches {
             write_touches_as_named(out, touches)?;

@@ -1,4 +1,4 @@
-//! What `refine` reports: the uncertainty of the mesh, and contacts rejected as outliers.
+//! Reports of `refine`: the uncertainty of the mesh, and contacts rejected as outliers.
 
 use std::fmt;
 
@@ -7,17 +7,17 @@ use touchup_core::numeric::counted;
 use touchup_core::reconstruct::{Outlier, Outliers, Patched, Support};
 
 reported! {
-    /// What `--json` prints of the uncertainty.
+    /// Uncertainty in the output of `--json`.
     pub struct UncertaintySummary, pub fn of(patched: &Patched, found: &Outliers) {
-        /// median standard deviation of the vertices that were touched
+        /// median standard deviation of the touched vertices
         touched_sigma_mm: f64 = touched_sigma_mm(patched),
-        /// contacts of the reconstruction: those that count and those that were rejected
+        /// contacts of the reconstruction, counted or rejected
         judged: u64 = found.contacts,
-        /// contacts that contradicted their place and did not count
+        /// rejected contacts, which contradict their place
         rejected: u64 = found.rejected,
-        /// places that moved because a second pass confirmed the contradiction
+        /// places moved by a second pass that confirms the contradiction
         relocated: u64 = found.relocated,
-        /// the last that were rejected, in order of time
+        /// the last rejected contacts, in order of time
         outliers: Vec<OutlierSummary> =
             found.last().skip(found.last().count().saturating_sub(MOST_LISTED)).map(OutlierSummary::of).collect(),
     }
@@ -34,17 +34,17 @@ fn touched_sigma_mm(patched: &Patched) -> f64 {
 }
 
 reported! {
-    /// Contacts one after the other that were rejected.
+    /// A run of successive rejected contacts.
     struct OutlierSummary, fn of(outlier: &Outlier) {
-        /// stamp of the first
+        /// stamp of the first contact
         stamp_s: f64 = outlier.stamp_ns as f64 * 1e-9,
-        /// where the one was that contradicted most
+        /// position of the most contradictory contact
         point_mm: [f64; 3] = (outlier.point.coords * 1e3).into(),
-        /// … and its normal
+        /// normal of that contact
         normal: [f64; 3] = outlier.normal.into(),
-        /// its distance from the place
+        /// distance of that contact from its place
         off_mm: f64 = outlier.innovation * 1e3,
-        /// … in standard deviations
+        /// distance in standard deviations
         sigmas: f64 = outlier.sigmas,
         contacts: u64 = outlier.contacts,
     }
@@ -52,10 +52,9 @@ reported! {
 
 /// Number of listed outliers.
 const MOST_LISTED: usize = 8;
-/// Of sound recordings less than two thousandths of the contacts were rejected; what more of them
-/// is lost is worth a word, …
+/// Share of rejected contacts worth a report; in sound recordings it is below 0.002.
 const WORTH_A_WORD: f64 = 0.1;
-/// … and where so many contradict the others, nobody knows which of them are right.
+/// Share of rejected contacts above which the right ones are unknown.
 const MOST_REJECTED: f64 = 0.4;
 
 impl UncertaintySummary {
@@ -63,17 +62,17 @@ impl UncertaintySummary {
         self.rejected as f64 > share * self.judged as f64
     }
 
-    /// Whether the contacts contradict each other so much that the result is worth nothing.
+    /// Whether contradictory contacts make the result worthless.
     pub fn is_contradictory(&self) -> bool {
         self.is_rejected(MOST_REJECTED)
     }
 
-    /// What was lost, where so many contacts were rejected that it is worth a word.
+    /// Loss of contacts, if their share is worth a report.
     pub fn loss(&self) -> Option<String> {
         self.is_rejected(WORTH_A_WORD).then(|| self.contradiction())
     }
 
-    /// How many contacts were rejected, and what to do.
+    /// Number of rejected contacts, and a remedy.
     pub fn contradiction(&self) -> String {
         let Self {
             rejected, judged, ..

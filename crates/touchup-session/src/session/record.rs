@@ -1,4 +1,4 @@
-//! The record of a session, which reproduces its result: scene, scan, recording, and the changes of
+//! The record of a session, which reproduces its result: scene, scan, recording, and changes of
 //! strokes.
 
 use std::io;
@@ -25,17 +25,17 @@ const SCENE: &str = "scene.yaml";
 const STROKES: &str = "strokes.jsonl";
 const RECORDING: &str = "recording";
 
-/// Longest time between flushes: a crash loses no more.
+/// Longest time between flushes, and maximum loss in a crash.
 const FLUSH_EVERY: Duration = Duration::from_millis(50);
 /// Retry period after a write error.
 const ASK_AGAIN: Duration = Duration::from_secs(1);
-/// Messages that wait for the disk at most: several seconds of both streams.
+/// Maximum number of messages waiting for the disk: several seconds of both streams.
 const MOST_WAITING: usize = 1 << 14;
 
-/// Why a session was not begun, or cannot be resumed.
+/// Error of beginning or resuming a session.
 #[derive(Debug, thiserror::Error)]
 pub enum SessionError {
-    /// The system refused.
+    /// The system refused access.
     #[error("{}: {source}", path.display())]
     Io {
         /// file or folder
@@ -43,15 +43,15 @@ pub enum SessionError {
         /// its reason
         source: io::Error,
     },
-    /// A file of the session is not as the session wrote it.
+    /// A file of the session has changed since the session wrote it.
     #[error("{}: {reason}; is that the folder of a session?", path.display())]
     Damaged {
         /// the file
         path: PathBuf,
-        /// what is wrong
+        /// the fault
         reason: String,
     },
-    /// The scan is another one now.
+    /// The scan has changed.
     #[error("{}: it changed since the session began: restore the scan", path.display())]
     ScanChanged {
         /// the scan
@@ -66,25 +66,25 @@ struct Description {
     mesh_unit: MeshUnit,
     wrench_topic: String,
     pose_topic: String,
-    /// RFC 3339, UTC; older sessions do not say it
+    /// RFC 3339, UTC; absent in older sessions
     #[serde(default, skip_serializing_if = "Option::is_none")]
     begun: Option<String>,
 }
 
-/// What a session says of itself, without its scan being looked at.
+/// Description of a session, without a check of its scan.
 #[derive(Clone, Debug)]
 pub struct SessionFacts {
-    /// day and time, UTC, RFC 3339; older sessions do not say it
+    /// day and time, UTC, RFC 3339; absent in older sessions
     pub begun: Option<String>,
     /// unit of the coordinates in its meshes
     pub mesh_unit: MeshUnit,
 }
 
 impl SessionFacts {
-    /// Reads them from the folder of a session.
+    /// Reads the description from the folder of a session.
     ///
     /// # Errors
-    /// [`SessionError`]: not every folder is that of a session.
+    /// [`SessionError`], also for any other folder.
     pub fn read(folder: &Path) -> Result<Self, SessionError> {
         let path = folder.join(DESCRIPTION);
         let text = read_text(&path).map_err(io_error(&path))?;
@@ -98,25 +98,25 @@ impl SessionFacts {
     }
 }
 
-/// A session as it is on the disk.
+/// A session on disk.
 #[derive(Debug)]
 pub struct SessionRecord {
-    /// the scan, as it was
+    /// the unrefined scan
     pub scan: PathBuf,
     /// unit of its coordinates
     pub mesh_unit: MeshUnit,
     /// the scene
     pub scene: PathBuf,
-    /// what was touched
+    /// recording of the touches
     pub recording: PathBuf,
     /// its topics
     pub topics: Topics,
-    /// what was taken back, done again, taken out and put back
+    /// undone, redone, excluded and restored strokes
     pub strokes: StrokeChanges,
 }
 
 impl SessionRecord {
-    /// Writes scene, beginning and reference of the scan into a new folder.
+    /// Writes scene, start time and reference of the scan into a new folder.
     ///
     /// # Errors
     /// [`SessionError::Io`].
@@ -149,7 +149,7 @@ impl SessionRecord {
             .map_err(io_error(folder.path()))
     }
 
-    /// Reads what the folder of a session holds, whether or not it was ended.
+    /// Reads the folder of a session, whether ended or not.
     ///
     /// # Errors
     /// [`SessionError`].
@@ -182,7 +182,7 @@ impl SessionRecord {
         })
     }
 
-    /// Reads what was taken back, done again, taken out and put back until now.
+    /// Reads the present undone, redone, excluded and restored strokes.
     ///
     /// # Errors
     /// [`SessionError`].
@@ -191,7 +191,7 @@ impl SessionRecord {
     }
 }
 
-/// A last line that a crash cut off was not done either.
+/// Ignores a last line cut off by a crash.
 fn read_strokes(path: &Path) -> Result<StrokeChanges, SessionError> {
     let text = read_text(path).map_err(io_error(path))?;
     let whole = text.rfind('\n').map_or("", |end| &text[..end]);
@@ -208,11 +208,11 @@ fn parsed<T: DeserializeOwned>(json: &str, path: &Path) -> Result<T, SessionErro
 /// Messages missing in the recording of a session.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Unrecorded {
-    /// how many messages
+    /// number of messages
     pub messages: u64,
     /// the last write error
     pub reason: Option<String>,
-    /// it still refuses
+    /// whether the disk still refuses
     pub is_refused: bool,
 }
 
@@ -226,7 +226,7 @@ pub struct SessionRecorder {
     end: Arc<RecordingEnd>,
 }
 
-/// Whether the recording is to end.
+/// End of the recording.
 #[derive(Debug, Default)]
 struct RecordingEnd {
     has_come: Mutex<bool>,
@@ -234,7 +234,7 @@ struct RecordingEnd {
 }
 
 impl SessionRecorder {
-    /// Starts the thread, which writes when `clock` says so.
+    /// Starts the thread, which writes in the time of `clock`.
     ///
     /// # Errors
     /// [`SessionError::Io`].
@@ -276,29 +276,29 @@ impl SessionRecorder {
         })
     }
 
-    /// Takes a message down whose header names `frame`; never waits. What finds no room is lost,
-    /// and counted.
+    /// Records a message with `frame` in its header; never waits. Without room it loses and counts
+    /// the message.
     pub fn write(&self, message: Message, frame: &'static str) {
         if self.sender.try_send(Note::Message(message, frame)).is_err() {
             locked(&self.unrecorded).messages += 1;
         }
     }
 
-    /// The folder that the messages go into.
+    /// The folder of the messages.
     pub fn recording(&self) -> PathBuf {
         self.folder.path().join(RECORDING)
     }
 
-    /// Something comes once all is on the disk that was written until now; nothing ever where the
-    /// disk refuses it, or where there is no room to wait.
+    /// A receiver for a signal once all earlier messages are on disk; no signal comes if the disk
+    /// refuses them, or without room in the queue.
     pub fn flushed(&self) -> Receiver<()> {
         let (to, flushed) = sync_channel(1);
-        // dropped where there is no room, which the receiver sees
+        // without room the sender drops, which the receiver sees
         let _ = self.sender.try_send(Note::Flush(to));
         flushed
     }
 
-    /// Takes down that a stroke was taken back, done again, taken out or put back.
+    /// Records an undone, redone, excluded or restored stroke.
     ///
     /// # Errors
     /// [`SessionError::Io`].
@@ -309,12 +309,12 @@ impl SessionRecorder {
             .map_err(io_error(&self.folder.path().join(STROKES)))
     }
 
-    /// Messages missing in the recording so far.
+    /// Messages missing in the recording.
     pub fn unrecorded(&self) -> Unrecorded {
         locked(&self.unrecorded).clone()
     }
 
-    /// Waits until all is taken down and ends the recording; returns as [`Self::unrecorded`].
+    /// Waits for all messages and ends the recording; returns [`Self::unrecorded`].
     pub fn finish(self) -> Unrecorded {
         let Self {
             sender,
@@ -343,11 +343,11 @@ fn io_error(path: &Path) -> impl FnOnce(io::Error) -> SessionError {
     }
 }
 
-/// What goes to the thread of the recorder.
+/// Requests to the thread of the recorder.
 enum Note {
-    /// a message whose header names this frame
+    /// a message with this frame in its header
     Message(Message, &'static str),
-    /// say when all before this is on the disk
+    /// signal once all earlier messages are on disk
     Flush(SyncSender<()>),
 }
 
@@ -362,7 +362,7 @@ struct Taker {
 impl Taker {
     /// Polls the queue: a wake-up for each message would cost the sender more than the message.
     ///
-    /// Messages of a failed write are lost; writing is retried later, as space may be freed.
+    /// Messages of a failed write are lost; later writes try again, as space may become free.
     fn take_down(mut self, messages: &Receiver<Note>) {
         loop {
             drop(self.clock.wait_while(
@@ -384,7 +384,7 @@ impl Taker {
                     if count > 0 {
                         self.accept();
                     }
-                    // who does not wait any more is gone
+                    // the receiver may be gone
                     for to in waiting {
                         let _ = to.send(());
                     }
@@ -402,7 +402,7 @@ impl Taker {
     }
 
     fn take(&mut self, message: &Message, frame: &str) {
-        // the disk is tried where it has not refused, or long enough ago
+        // writes unless the disk refused recently
         if self
             .refused_at
             .is_some_and(|at| self.clock.since(at) < ASK_AGAIN)
@@ -462,7 +462,7 @@ mod tests {
         reader.map_while(Result::ok).collect()
     }
 
-    /// 1 795 212 850 s is 2026-11-20T22:14:10Z, as `date -u` has it.
+    /// 1 795 212 850 s is 2026-11-20T22:14:10Z, by `date -u`.
     #[test]
     fn a_session_says_when_it_began_and_an_older_one_does_not() {
         let (parent, folder) = folder();
@@ -494,7 +494,7 @@ mod tests {
         assert!(SessionFacts::read(parent.path()).is_err());
     }
 
-    /// What came in between two of its looks is on the disk after the second, and not before.
+    /// Messages between two polls are on disk after the second, and not before.
     #[test]
     fn what_was_written_is_on_the_disk_50_ms_later() {
         let ((_parent, folder), (clock, hand)) = (folder(), Clock::manual());
@@ -531,8 +531,7 @@ mod tests {
         assert_eq!(on_disk(&folder), written);
     }
 
-    /// The disk stalls for as long as the queue holds, and nothing is lost; later messages are
-    /// counted as lost.
+    /// The disk stalls for the capacity of the queue without loss; later messages count as lost.
     #[test]
     fn what_waits_for_the_disk_is_not_lost_and_what_finds_no_room_is_counted() {
         let ((_parent, folder), (clock, hand)) = (folder(), Clock::manual());
@@ -561,7 +560,7 @@ mod tests {
         assert!(on_disk(&folder) == kept);
     }
 
-    /// The folder goes away and comes back, as a disk does that is full for a time.
+    /// The folder disappears and returns, like a temporarily full disk.
     #[test]
     fn it_records_on_when_the_disk_takes_again() {
         let ((_parent, folder), (clock, hand)) = (folder(), Clock::manual());
@@ -577,12 +576,12 @@ mod tests {
         );
 
         folder.create_folder(RECORDING).unwrap();
-        // it does not ask before its time …
+        // no retry before its time
         recorder.write(wrench(6), "tip");
         hand.advance(ASK_AGAIN - FLUSH_EVERY);
         let refused = recorder.unrecorded();
         assert!(refused.messages == 6 && refused.is_refused);
-        // … and then it does
+        // a retry at its time
         recorder.write(wrench(7), "tip");
         hand.advance(FLUSH_EVERY);
         let accepted = recorder.unrecorded();

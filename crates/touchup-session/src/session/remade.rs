@@ -1,4 +1,4 @@
-//! The evidence of a session made again from its recording, without the strokes that are taken out.
+//! Rebuilds the evidence of a session from its recording, without excluded strokes.
 
 use std::path::Path;
 
@@ -10,46 +10,45 @@ use super::strokes::{Exchange, StrokeChanges, StrokeReplay};
 use crate::live::EvidenceReplay;
 use crate::replay::{Recording, ReplayError, each_sample};
 
-/// Why the evidence was not made again.
+/// Error of rebuilding evidence.
 #[derive(Debug, thiserror::Error)]
 pub enum RemakeError {
-    /// The recording cannot be read.
+    /// The recording is unreadable.
     #[error(transparent)]
     Recording(#[from] RecordingError),
-    /// It is damaged before its first message.
+    /// The recording is damaged before its first message.
     #[error(transparent)]
     Replay(#[from] ReplayError),
-    /// The last sample is not in it.
+    /// The recording lacks the last sample.
     #[error(
         "the recording of the session lacks samples that were taken: without them the other touches cannot be made again"
     )]
     Incomplete,
-    /// Undone meanwhile was another stroke than would be undone then.
+    /// The rebuild would undo another stroke than the session did.
     #[error(
         "strokes were undone or redone since, and would be others with this one: redo or undo them first"
     )]
     OtherStroke,
 }
 
-/// What is made again, and of which samples.
+/// Source of the evidence, and range of its samples.
 #[derive(Clone, Debug)]
 pub struct EvidenceSource<'a> {
-    /// folder of the recording, which may be written on meanwhile
+    /// folder of the recording, possibly still growing
     pub recording: &'a Path,
     /// its topics
     pub topics: &'a Topics,
     /// brings messages into the frames of the scene
     pub placement: Option<Placement>,
-    /// how they are paired
+    /// pairing parameters
     pub sync: SyncParams,
-    /// up to the sample of this stamp, ns
+    /// stamp of the last sample, ns
     pub until_ns: i64,
 }
 
 impl EvidenceSource<'_> {
-    /// Gives all samples to `replay` but those of strokes that are taken out; takes back and does
-    /// again what was. It is bit by bit what `touchup refine` makes of a recording that has never
-    /// had those samples.
+    /// Passes all samples to `replay`, except those of excluded strokes, and repeats undo and redo.
+    /// The result is bit by bit that of `touchup refine` for a recording without those samples.
     ///
     /// # Errors
     /// [`RemakeError`].
@@ -92,8 +91,7 @@ impl EvidenceSource<'_> {
     }
 }
 
-/// Takes strokes back or does them again before a sample; returns whether they are those that it
-/// was then.
+/// Undoes or redoes strokes before a sample; returns whether they are the strokes of the session.
 fn exchanged(replay: &mut EvidenceReplay, strokes: &mut StrokeReplay, before_ns: i64) -> bool {
     let mut are_same = true;
     while let Some((Exchange { stroke_ns, .. }, is_undo)) = strokes.next_before(before_ns) {

@@ -1,5 +1,4 @@
-//! Strokes that were taken back, done again, taken out and put back in a session, and what is left
-//! of its samples.
+//! Undone, redone, excluded and restored strokes of a session, and its remaining samples.
 
 use std::iter::Peekable;
 use std::vec::IntoIter;
@@ -8,22 +7,22 @@ use serde::{Deserialize, Serialize};
 
 use touchup_core::reconstruct::StrokeSpan;
 
-/// A change of strokes, as the record of a session has it.
+/// A change of strokes in the record of a session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "change", rename_all = "snake_case", deny_unknown_fields)]
 pub enum StrokeChange {
-    /// the last stroke was taken back
+    /// undoes the last stroke
     Undo(Exchange),
-    /// the stroke was done again that was taken back last
+    /// redoes the last undone stroke
     Redo(Exchange),
-    /// the samples of a stroke were taken out, as if they had never come
+    /// excludes the samples of a stroke, as if they had never come
     TakeOut(Removal),
-    /// … and put back, as if they had never been taken out
+    /// restores the samples of a stroke, as if never excluded
     PutBack(Removal),
 }
 
 impl StrokeChange {
-    /// After the sample of this stamp, ns.
+    /// Stamp of the sample before the change, ns.
     pub fn after_ns(&self) -> i64 {
         match self {
             Self::Undo(exchange) | Self::Redo(exchange) => exchange.after_ns,
@@ -32,26 +31,26 @@ impl StrokeChange {
     }
 }
 
-/// When a stroke was taken back or done again, and which.
+/// Time and stroke of an undo or redo.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Exchange {
-    /// after the sample of this stamp, ns
+    /// stamp of the sample before, ns
     pub after_ns: i64,
-    /// its touch-down, ns; `None` where there is no patch
+    /// touch-down of the stroke, ns; `None` without a patch
     pub stroke_ns: Option<i64>,
 }
 
-/// When the samples of a stroke were taken out or put back, and which.
+/// Time and stroke of an exclusion or restoration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Removal {
-    /// after the sample of this stamp, ns
+    /// stamp of the sample before, ns
     pub after_ns: i64,
     /// from touch-down until the next
     pub stroke: StrokeSpan,
 }
 
-/// All changes of strokes in a session, in their order.
+/// All changes of strokes in a session, in order.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct StrokeChanges(Vec<StrokeChange>);
 
@@ -62,17 +61,17 @@ impl FromIterator<StrokeChange> for StrokeChanges {
 }
 
 impl StrokeChanges {
-    /// Whether there is none.
+    /// Whether there are no changes.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
-    /// One more.
+    /// Adds a change.
     pub fn push(&mut self, change: StrokeChange) {
         self.0.push(change);
     }
 
-    /// What is taken out in the end, the last one last.
+    /// The strokes excluded in the end, the last one last.
     pub fn taken_out(&self) -> Vec<StrokeSpan> {
         let mut spans = Vec::new();
         for change in &self.0 {
@@ -85,14 +84,14 @@ impl StrokeChanges {
         spans
     }
 
-    /// Whether a stroke was taken back or done again.
+    /// Whether there is an undo or redo.
     pub fn has_exchanges(&self) -> bool {
         self.0
             .iter()
             .any(|change| matches!(change, StrokeChange::Undo(_) | StrokeChange::Redo(_)))
     }
 
-    /// What is to be done along the samples of the session for its end: strokes that are taken out
+    /// The changes to apply along the samples for the final state of the session: excluded strokes
     /// never come.
     pub fn replay(&self) -> StrokeReplay {
         let taken_out = self.taken_out();
@@ -112,7 +111,7 @@ impl StrokeChanges {
         }
     }
 
-    /// All that was done along the samples of the session, as it came.
+    /// All changes along the samples of the session, in order.
     pub fn history(self) -> StrokeHistory {
         StrokeHistory {
             changes: self,
@@ -129,20 +128,20 @@ pub struct StrokeReplay {
 }
 
 impl StrokeReplay {
-    /// Whether the sample of this stamp is left.
+    /// Whether the sample of this stamp remains.
     pub fn takes(&self, stamp_ns: i64) -> bool {
         !self.taken_out.iter().any(|span| span.contains(stamp_ns))
     }
 
-    /// The next stroke that was taken back (true) or done again (false) before the sample of this
-    /// stamp; strokes that are taken out are not among them.
+    /// The next undo (true) or redo (false) before the sample of this stamp; skips excluded
+    /// strokes.
     pub fn next_before(&mut self, stamp_ns: i64) -> Option<(Exchange, bool)> {
         self.exchanges
             .next_if(|(exchange, _)| exchange.after_ns < stamp_ns)
     }
 }
 
-/// Walks along all samples of a session, with each change where it was made.
+/// Walks along all samples of a session, with each change at its time.
 #[derive(Clone, Debug)]
 pub struct StrokeHistory {
     changes: StrokeChanges,
@@ -150,7 +149,7 @@ pub struct StrokeHistory {
 }
 
 impl StrokeHistory {
-    /// The next change that was made before the sample of this stamp.
+    /// The next change before the sample of this stamp.
     pub fn next_before(&mut self, stamp_ns: i64) -> Option<StrokeChange> {
         let next = self
             .changes
@@ -161,12 +160,12 @@ impl StrokeHistory {
         next.copied()
     }
 
-    /// Those that [`Self::next_before`] has returned.
+    /// All changes that [`Self::next_before`] has returned.
     pub fn so_far(&self) -> StrokeChanges {
         self.changes.0.iter().take(self.done).copied().collect()
     }
 
-    /// The same from its beginning.
+    /// The same history from its beginning.
     pub fn again(self) -> Self {
         self.changes.history()
     }
@@ -200,7 +199,7 @@ mod tests {
     #[test]
     fn a_stroke_that_is_taken_out_is_neither_taken_back_nor_done_again() {
         use StrokeChange::{PutBack, Redo, TakeOut, Undo};
-        // strokes at 100, 200 and 300; two are taken back, one is done again; then that one goes
+        // strokes at 100, 200 and 300: two undone, one redone, then that one excluded
         let back = [
             Undo(exchange(390, 300)),
             Undo(exchange(390, 200)),

@@ -1,19 +1,19 @@
-//! The scene that all jobs begin with, and what becomes of it where keys are set.
+//! Base scene of all jobs, and its changes by keys.
 
 use serde_json::{Map, Value};
 
 use super::sampling::KeySetting;
 use crate::scene::{Scene, SceneError, yaml_error};
 
-/// What a refinement does without, and what names files: none of it changes a result.
+/// Sections unused by a refinement, and file names: they change no result.
 const WITHOUT: [&str; 1] = ["robot"];
 const WITHOUT_OF_SCAN: [&str; 2] = ["file", "unit"];
 
-/// A scene as it is written.
+/// A scene as written.
 #[derive(Clone, Debug)]
 pub(super) struct BaseScene {
     written: Map<String, Value>,
-    /// all that is built unless it is said otherwise
+    /// default scene with all usual parts
     usual: Value,
 }
 
@@ -21,14 +21,14 @@ pub(super) struct BaseScene {
 #[derive(Clone, Debug)]
 pub(super) struct JobScene {
     pub scene: Scene,
-    /// every key that is built with its value, in the units of the file: what a result depends on
+    /// every active key with its value, in the units of the file: the full dependency of a result
     pub whole: Value,
 }
 
-/// Why a scene with keys in it cannot be.
+/// Error of a scene with keys set.
 #[derive(Debug)]
 pub(super) struct KeyError {
-    /// the key that is wrong, where one is
+    /// the wrong key, if there is one
     pub key: Option<String>,
     pub why: String,
 }
@@ -38,7 +38,7 @@ fn parsed(yaml: &str) -> Result<Value, SceneError> {
 }
 
 impl BaseScene {
-    /// - `yaml`: text of a scene that was checked; empty for the usual one.
+    /// - `yaml`: checked text of a scene; empty for the default.
     ///
     /// # Errors
     /// [`SceneError::Yaml`]
@@ -58,10 +58,10 @@ impl BaseScene {
         Ok(Self { written, usual })
     }
 
-    /// With keys set.
+    /// The scene with keys set.
     ///
     /// # Errors
-    /// In the scene's own words; a misspelt key with the one that is meant.
+    /// In the scene's own words; for a misspelt key with the intended one.
     pub fn with(&self, keys: &KeySetting) -> Result<JobScene, KeyError> {
         let mut written = self.written.clone();
         for (key, value) in keys {
@@ -88,7 +88,7 @@ impl BaseScene {
         })
     }
 
-    /// The error of a scene at the key that makes it.
+    /// The error of a scene at the key that causes it.
     fn blamed(&self, keys: &KeySetting, error: SceneError) -> KeyError {
         if matches!(error, SceneError::NoRadius) {
             let why = "the radius of the ball is not known: name tip.radius_mm in the scene, or under keys".to_owned();
@@ -107,7 +107,7 @@ impl BaseScene {
     }
 }
 
-/// The line and column of a text that nobody has written are of no use.
+/// Removes line and column, useless in a generated text.
 fn without_place(message: &str) -> String {
     let mut message = message.to_owned();
     if let Some(at) = message.find(" at line ") {
@@ -150,7 +150,7 @@ fn set(written: &mut Map<String, Value>, path: &str, value: &Value) -> Result<()
     Ok(())
 }
 
-/// Puts what is written over what is usual.
+/// Overlays written values on the defaults.
 fn lay_over(usual: &mut Value, written: &Value) {
     match (usual, written) {
         (Value::Object(usual), Value::Object(written)) => {
@@ -165,7 +165,7 @@ fn lay_over(usual: &mut Value, written: &Value) {
     }
 }
 
-/// The same with all keys in order and one form for each number.
+/// The same value with sorted keys and one form per number.
 pub(super) fn sorted(value: &Value) -> Value {
     match value {
         Value::Object(keys) => {

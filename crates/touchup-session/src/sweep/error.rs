@@ -1,4 +1,4 @@
-//! What can be wrong with a sweep.
+//! Errors of a sweep.
 
 use std::path::PathBuf;
 
@@ -9,18 +9,18 @@ use touchup_io::file_error::FileError;
 use touchup_io::json_lines::JsonLineError;
 use touchup_sim::SimError;
 
-/// Why a sweep was not planned, or a job not run.
+/// Error of planning a sweep or running a job.
 #[derive(Debug, thiserror::Error)]
 pub enum SweepError {
-    /// What is swept.
+    /// The grid file.
     #[error("{}: {why}", path.display())]
     Grid {
         /// the file
         path: PathBuf,
-        /// with the line, where there is one
+        /// fault, with its line if known
         why: String,
     },
-    /// The scene that all jobs begin with.
+    /// The base scene of all jobs.
     #[error(transparent)]
     Scene(#[from] SceneError),
     /// More jobs than a plan may have.
@@ -30,15 +30,15 @@ pub enum SweepError {
     TooMany {
         /// the file
         path: PathBuf,
-        /// … as a number, or as more than can be counted
+        /// number of jobs, or a text for an overflow
         jobs: String,
         /// the limit
         most: u64,
     },
-    /// A file cannot be read or written.
+    /// An unreadable or unwritable file.
     #[error(transparent)]
     File(#[from] FileError),
-    /// A line of the jobs.
+    /// A line of the file of jobs.
     #[error(transparent)]
     Line(#[from] JsonLineError),
     /// No such job.
@@ -46,21 +46,21 @@ pub enum SweepError {
     NoJob {
         /// the file of the jobs
         path: PathBuf,
-        /// by its number
+        /// number of the job
         job: u64,
-        /// how many there are
+        /// number of jobs
         count: u64,
     },
-    /// A file is not what it was.
+    /// A file has changed since the plan.
     #[error(
         "{what} is not what was planned: sha256 is {found}, and {planned} in the plan; bring the file back, or plan again (touchup sweep plan)"
     )]
     Changed {
-        /// which
+        /// the file
         what: String,
-        /// of the content now
+        /// hash of the present content
         found: String,
-        /// … and then
+        /// hash in the plan
         planned: String,
     },
     /// Another touchup made the plan.
@@ -68,45 +68,45 @@ pub enum SweepError {
         "job {job} was planned by touchup {planned}, and this is {own}: plan again, or run it by the same version"
     )]
     OtherVersion {
-        /// by its number
+        /// number of the job
         job: u64,
         /// version of the plan
         planned: String,
         /// version that runs
         own: &'static str,
     },
-    /// The line was changed by hand.
+    /// A line edited by hand.
     #[error(
         "job {job} is not the one that its id names: plan again (touchup sweep plan), and leave the lines as they are"
     )]
     OtherJob {
-        /// by its number
+        /// number of the job
         job: u64,
     },
-    /// A result that was not written by a job.
+    /// A folder or file that no job wrote.
     #[error("{} is no result of a job: {why}", path.display())]
     NoResult {
         /// the folder or file
         path: PathBuf,
-        /// what is missing
+        /// the missing part
         why: String,
     },
-    /// … that is no longer as the job wrote it.
+    /// A result changed since its job wrote it.
     #[error(
         "job {job}: {} is damaged: {why}; run it anew by touchup sweep run --job {job} --again", result.display()
     )]
     Damaged {
-        /// by its number
+        /// number of the job
         job: u64,
-        /// its folder
+        /// folder of the result
         result: PathBuf,
-        /// which file, and what is wrong with it
+        /// the file and its fault
         why: String,
     },
     /// A simulated scan or touch.
     #[error(transparent)]
     Simulated(#[from] SimError),
-    /// A result that cannot be written.
+    /// An unwritable result.
     #[error(transparent)]
     Outcome(Box<OutcomeError>),
     /// The features of a result.

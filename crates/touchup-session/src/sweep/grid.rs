@@ -1,4 +1,4 @@
-//! The file that says what is swept.
+//! The grid file of a sweep.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -13,7 +13,7 @@ use crate::scene::yaml_error;
 use touchup_io::mesh_file::MeshUnit;
 use touchup_io::text_file::read_text;
 
-/// The file, as it is written; paths are relative to its folder.
+/// The grid file as written; paths are relative to its folder.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct GridFile {
@@ -31,7 +31,7 @@ struct GridFile {
     sampling: Sampling,
 }
 
-/// A part that is scanned and touched by simulation, once for each seed.
+/// A part for simulated scan and touch, once per seed.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SimulatedPart {
@@ -40,11 +40,11 @@ pub(super) struct SimulatedPart {
     pub seeds: Vec<u64>,
 }
 
-/// What is swept.
+/// The grid of a sweep.
 #[derive(Debug)]
 pub(super) struct SweepGrid {
     pub path: PathBuf,
-    /// of the file, to name its lines
+    /// text of the file, to name its lines
     text: String,
     pub scan: Option<PathBuf>,
     pub mesh_unit: MeshUnit,
@@ -123,7 +123,7 @@ impl SweepGrid {
         }
     }
 
-    /// What is wrong with a key, with its line.
+    /// The error of a key, with its line.
     pub fn at_key(&self, key: &str, why: String) -> SweepError {
         let names = |line: &str| {
             let rest = line

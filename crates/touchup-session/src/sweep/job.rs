@@ -15,39 +15,40 @@ use touchup_io::mesh_file::MeshUnit;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Job {
-    /// its number in the plan, from 0 on
+    /// number in the plan, from 0
     pub job: u64,
-    /// names its result: of the content of scan and recording, the whole scene, and the version
+    /// name of the result: hash of the content of scan and recording, the whole scene, and the
+    /// version
     pub id: String,
-    /// version that planned it
+    /// version of the planner
     pub touchup: String,
     /// relative to the folder of the plan
     pub scan: PathBuf,
-    /// of its content
+    /// hash of the scan
     pub scan_sha256: String,
-    /// of the coordinates in the scan's file
+    /// unit of the coordinates in the scan's file
     pub mesh_unit: MeshUnit,
     /// relative to the folder of the plan
     pub recording: PathBuf,
-    /// of its content
+    /// hash of the recording
     pub recording_sha256: String,
-    /// where in the recording the poses and wrenches are, as far as it is named
+    /// named location of poses and wrenches in the recording
     #[serde(default, skip_serializing_if = "RecordedAs::is_usual")]
     pub recorded: RecordedAs,
-    /// the scene that the keys are set in, relative to the folder of the plan
+    /// base scene of the keys, relative to the folder of the plan
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scene: Option<PathBuf>,
-    /// of its content
+    /// hash of the scene
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scene_sha256: Option<String>,
-    /// of a simulated scan and touch
+    /// seed of a simulated scan and touch
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub seed: Option<u64>,
-    /// by path in the scene
+    /// values by path in the scene
     pub keys: BTreeMap<String, Value>,
 }
 
-/// The jobs of a file, in its order, read one at a time.
+/// Iterator over the jobs of a file, in order.
 #[derive(Debug)]
 pub struct JobsFile {
     lines: JsonLines<Job>,
@@ -62,7 +63,7 @@ impl JobsFile {
         })
     }
 
-    /// The folder that its paths are relative to.
+    /// The base folder of its paths.
     pub fn folder(path: &Path) -> PathBuf {
         path.parent().unwrap_or(Path::new("")).to_owned()
     }

@@ -1,10 +1,10 @@
-//! Many refinements: the settings of a scene times recordings, each a job that gives the same bytes
-//! wherever it runs.
+//! Many refinements: settings of a scene times recordings, each a job with the same bytes on any
+//! machine.
 //!
-//! [`SweepPlan`] makes jobs of a file, [`JobRunner`] runs one, [`tables_of`] makes a table of what
-//! came of all. A job is named by what it depends on: the content of scan and recording, the whole
-//! scene, and the version of touchup. So its result needs no more than a place with its name, and
-//! no engine has to remember what was done.
+//! [`SweepPlan`] makes jobs of a file, [`JobRunner`] runs one, [`tables_of`] makes a table of all
+//! results. The name of a job is a hash of its dependencies: the content of scan and recording, the
+//! whole scene, and the version of touchup. So a result needs only a place with its name, and no
+//! engine has to remember finished jobs.
 
 mod base_scene;
 mod error;

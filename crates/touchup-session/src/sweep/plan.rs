@@ -1,4 +1,4 @@
-//! From what is swept to the jobs.
+//! Plans the jobs of a sweep grid.
 
 use std::path::{Component, Path, PathBuf};
 
@@ -15,7 +15,7 @@ use touchup_io::file_error::FileError;
 use touchup_io::machine::VERSION;
 use touchup_io::mesh_file::MeshUnit;
 
-/// Jobs of a plan at most.
+/// Maximum number of jobs in a plan.
 pub const MOST_JOBS: u64 = 1_000_000;
 
 /// Scan and recording of some jobs.
@@ -41,12 +41,11 @@ pub struct SweepPlan {
 }
 
 impl SweepPlan {
-    /// Reads and checks all that is swept. Simulated scans and recordings are written below
-    /// `folder`.
+    /// Reads and checks the grid. Writes simulated scans and recordings below `folder`.
     ///
-    /// - `grid`: the file that says what is swept.
-    /// - `recordings`: more of them, relative to the present folder.
-    /// - `folder`: of the file of jobs; their paths are relative to it.
+    /// - `grid`: the grid file.
+    /// - `recordings`: further recordings, relative to the present folder.
+    /// - `folder`: folder of the file of jobs, the base of their paths.
     ///
     /// # Errors
     /// [`SweepError`]
@@ -101,7 +100,7 @@ impl SweepPlan {
                 most: MOST_JOBS,
             });
         };
-        // every setting is checked before anything is made of one
+        // checks every setting before any output
         for at in 0..settings {
             let setting = grid.sampling.setting(&grid.keys, at);
             base.with(&setting).map_err(|error| blamed(&grid, error))?;
@@ -124,12 +123,12 @@ impl SweepPlan {
         })
     }
 
-    /// How many jobs there are.
+    /// Number of jobs.
     pub fn count(&self) -> u64 {
         self.settings * self.inputs.len() as u64
     }
 
-    /// All jobs: of each setting those of all recordings or seeds.
+    /// All jobs: for each setting one per recording or seed.
     pub fn jobs(&self) -> impl Iterator<Item = Result<Job, SweepError>> {
         (0..self.settings).flat_map(|at| self.jobs_of(at))
     }
@@ -230,7 +229,7 @@ fn inputs_of(grid: &SweepGrid, folder: &Path) -> Result<Vec<PlannedInput>, Sweep
         .collect()
 }
 
-/// The path of a file from a folder on.
+/// The path of a file relative to a folder.
 fn beside(path: &Path, folder: &Path) -> Result<PathBuf, FileError> {
     let whole = |path: &Path| {
         let path = if path.as_os_str().is_empty() {
@@ -246,7 +245,7 @@ fn beside(path: &Path, folder: &Path) -> Result<PathBuf, FileError> {
     Ok(relative(&whole(path)?, &whole(folder)?))
 }
 
-/// - `path`, `folder`: from the root.
+/// - `path`, `folder`: absolute.
 fn relative(path: &Path, folder: &Path) -> PathBuf {
     let (mut path, mut folder) = (path.components().peekable(), folder.components().peekable());
     while path.peek().is_some() && path.peek() == folder.peek() {

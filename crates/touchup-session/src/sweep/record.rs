@@ -1,4 +1,4 @@
-//! All that a result depends on: `job.json` in its folder, of which the id is the hash.
+//! All dependencies of a result: `job.json` in its folder, whose hash is the id.
 
 use std::path::Path;
 
@@ -15,28 +15,28 @@ use touchup_io::text_file::read_text;
 /// Hexadecimal digits of an id: 128 bits.
 const DIGITS: usize = 32;
 
-/// What a job is made of, without paths.
+/// Content of a job, without paths.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct JobRecord {
-    /// hash of the rest
+    /// hash of the other fields
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub id: String,
-    /// version
+    /// version of touchup
     pub touchup: String,
-    /// of the content of the scan
+    /// hash of the scan
     pub scan_sha256: String,
-    /// of its coordinates
+    /// unit of its coordinates
     pub mesh_unit: MeshUnit,
-    /// of the content of the recording
+    /// hash of the recording
     pub recording_sha256: String,
-    /// where in it the poses and wrenches are, as far as it is named
+    /// named location of its poses and wrenches
     pub recorded: RecordedAs,
-    /// every key that is built with its value
+    /// every active key with its value
     pub scene: Value,
 }
 
 impl JobRecord {
-    /// - `scene`: whole, its keys in order.
+    /// - `scene`: whole, with sorted keys.
     pub(super) fn new(
         scan_sha256: &str,
         mesh_unit: MeshUnit,
@@ -63,7 +63,7 @@ impl JobRecord {
 /// Name of the file in the folder of a result.
 pub(super) const RECORD: &str = "job.json";
 
-/// What the result in a folder depends on.
+/// The dependencies of the result in a folder.
 ///
 /// # Errors
 /// [`SweepError::NoResult`]

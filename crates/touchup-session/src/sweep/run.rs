@@ -1,4 +1,4 @@
-//! One job from its line to its folder.
+//! Runs one job from its line to its folder.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -26,32 +26,32 @@ pub(super) const SUMMARY: &str = "summary.json";
 pub(super) const FAILED: &str = "failed.json";
 pub(super) const MESH: &str = "refined.ply";
 pub(super) const FEATURES: &str = "features.json";
-/// What the others hold, as `sha256sum --check` reads it.
+/// Hashes of the other files, for `sha256sum --check`.
 const SUMS: &str = "SHA256SUMS";
 
-/// Content of files that a process has already: then they are not read.
+/// Content of files that a process already holds, in place of reading them.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct GivenInput<'a> {
-    /// of the scan's file
+    /// content of the scan's file
     pub scan: Option<&'a [u8]>,
-    /// of the recording's file
+    /// content of the recording's file
     pub recording: Option<&'a [u8]>,
 }
 
-/// What there is of a job.
+/// State of a job.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JobReport {
-    /// its number
+    /// number of the job
     pub job: u64,
-    /// its name
+    /// id of the job
     pub id: String,
     /// folder of its result
     pub result: PathBuf,
-    /// whether it was there before
+    /// whether the result existed before
     pub was_there: bool,
-    /// why nothing came of it
+    /// reason of a failure
     pub failed: Option<String>,
-    /// summary.json; nothing where it failed
+    /// summary.json; null after a failure
     pub summary: Value,
 }
 
@@ -63,16 +63,16 @@ pub struct JobRunner {
     hashes: RefCell<BTreeMap<PathBuf, String>>,
 }
 
-/// A file of a job where it can be read.
+/// A readable input file of a job.
 struct InputFile {
     path: PathBuf,
-    /// removes one that was made of given bytes
+    /// removes a file made of given bytes
     _given: Option<FileBeside>,
 }
 
 impl JobRunner {
-    /// - `folder`: of the file of jobs.
-    /// - `results`: where each has a folder by its id; made where it is not there.
+    /// - `folder`: folder of the file of jobs.
+    /// - `results`: parent of the result folders, each named by its id; created if missing.
     pub fn new(folder: PathBuf, results: PathBuf) -> Self {
         Self {
             folder,
@@ -81,15 +81,14 @@ impl JobRunner {
         }
     }
 
-    /// Runs a job; one whose result is there returns at once. A refinement that fails by its input
-    /// is a result as well.
+    /// Runs a job; returns at once if its result exists. A refinement that fails by its input is a
+    /// result as well.
     ///
-    /// - `again`: also where its result is there, which is replaced.
+    /// - `again`: whether to replace an existing result.
     /// - `at_each`: called after each record, to show the progress.
     ///
     /// # Errors
-    /// [`SweepError`] for a job that cannot be run, or its result not be written: then there is
-    /// none.
+    /// [`SweepError`] if the job cannot run or its result cannot be written: then there is none.
     pub fn run(
         &self,
         job: &Job,
@@ -127,7 +126,7 @@ impl JobRunner {
         write_json(&claimed.path().join(RECORD), &record)?;
         let plain = |message: &str| {
             let mut named = [(&scan.path, "the scan"), (&recording.path, "the recording")];
-            // one may begin as the other does
+            // a path may be a prefix of the other
             named.sort_by_key(|(path, _)| std::cmp::Reverse(path.as_os_str().len()));
             named.iter().fold(message.to_owned(), |text, (path, name)| {
                 text.replace(&*path.to_string_lossy(), name)
@@ -156,7 +155,7 @@ impl JobRunner {
         report(job, claimed.publish(again)?, false)
     }
 
-    /// A file of a job, of which the content is what was planned.
+    /// An input file of a job with the planned content.
     fn input(
         &self,
         what: &str,
@@ -187,7 +186,7 @@ impl JobRunner {
         })
     }
 
-    /// Read once for all jobs.
+    /// Hash of a file, read once for all jobs.
     fn hash(&self, path: &Path) -> Result<String, SweepError> {
         if let Some(known) = self.hashes.borrow().get(path) {
             return Ok(known.clone());
@@ -199,7 +198,7 @@ impl JobRunner {
         Ok(hash)
     }
 
-    /// The scene with the keys of the job, and what its result depends on.
+    /// The scene with the keys of the job, and the dependencies of its result.
     fn scene(&self, job: &Job) -> Result<(JobScene, JobRecord), SweepError> {
         let text = match &job.scene {
             Some(path) => {
@@ -247,16 +246,16 @@ impl JobRunner {
     }
 }
 
-/// It becomes the name of a folder.
+/// Whether the text is an id, which names a folder.
 fn is_id(id: &str) -> bool {
     id.len() == 32 && id.bytes().all(|byte| byte.is_ascii_hexdigit())
 }
 
-/// Why there is no mesh.
+/// Cause of a missing mesh.
 enum JobFailure {
-    /// … which is so wherever it runs
+    /// the input, on any machine
     OfInput(String),
-    /// … which another try may change
+    /// the system, possibly not at another try
     OfSystem(SweepError),
 }
 
@@ -320,7 +319,7 @@ fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<(), SweepErr
     Ok(write_text(path, &(text + "\n"))?)
 }
 
-/// What is in the folder of a result.
+/// State of a job from the folder of its result.
 fn report(job: &Job, result: PathBuf, was_there: bool) -> Result<JobReport, SweepError> {
     let ResultFiles { failed, summary } = ResultFiles::of_job(job, &result)?;
     Ok(JobReport {
@@ -350,7 +349,7 @@ pub(super) struct ResultFiles {
 }
 
 impl ResultFiles {
-    /// Those of a job, whose folder may have been changed since.
+    /// Files of a job, whose folder may have changed.
     ///
     /// # Errors
     /// [`SweepError::Damaged`]
@@ -369,7 +368,7 @@ impl ResultFiles {
     }
 
     /// # Errors
-    /// [`SweepError::NoResult`]: a file that is missing, or is not as it was written.
+    /// [`SweepError::NoResult`] for a missing or changed file.
     pub fn read(result: &Path) -> Result<Self, SweepError> {
         let no_result = |why: String| SweepError::NoResult {
             path: result.to_owned(),

@@ -1,4 +1,4 @@
-//! Which values the keys have together: all of a grid, or a sample.
+//! Combinations of key values: a whole grid, or a sample.
 
 use std::collections::BTreeMap;
 
@@ -7,10 +7,10 @@ use rand_pcg::Pcg64;
 use serde::Deserialize;
 use serde_json::Value;
 
-/// The value of each key that is set, by its path in the scene.
+/// The value of each set key, by its path in the scene.
 pub(super) type KeySetting = BTreeMap<String, Value>;
 
-/// How a range is divided.
+/// Division of a range.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Scale {
@@ -24,7 +24,7 @@ pub(super) enum Scale {
 /// The values of one key.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum KeyValues {
-    /// these, one after the other; one alone is the same in all jobs
+    /// successive values; a single one is the same in all jobs
     Listed(Vec<Value>),
     /// between two numbers, both included
     Range {
@@ -45,20 +45,20 @@ struct WrittenRange {
     scale: Scale,
 }
 
-/// Which settings are taken.
+/// Selection of settings.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase", deny_unknown_fields)]
 pub(super) enum Sampling {
-    /// every value of each key with every one of the others
+    /// every combination of the keys' values
     #[default]
     Grid,
-    /// at random, each key by itself
+    /// at random, each key independently
     Random {
         samples: u32,
         #[serde(default = "first_seed")]
         seed: u64,
     },
-    /// points of Sobol's sequence, scrambled: they fill the space of all keys evenly
+    /// points of Sobol's sequence, scrambled: evenly over the space of all keys
     Sobol {
         samples: u32,
         #[serde(default = "first_seed")]
@@ -70,12 +70,12 @@ fn first_seed() -> u64 {
     1
 }
 
-/// Sobol's sequence is that long, and has so many dimensions: those of the library.
+/// Maximum length and dimensions of Sobol's sequence in the library.
 const MOST_SOBOL: u32 = 1 << 16;
 const MOST_DIMENSIONS: usize = sobol_burley::NUM_DIMENSIONS as usize;
 
 impl KeyValues {
-    /// As they are written: a list, a range, or one value.
+    /// Parses written values: a list, a range, or one value.
     pub fn of(written: Value) -> Result<Self, String> {
         match written {
             Value::Array(values) if values.is_empty() => {
@@ -111,7 +111,7 @@ impl KeyValues {
         }
     }
 
-    /// How many a grid has.
+    /// Number of values in a grid.
     fn count(&self) -> u64 {
         match self {
             Self::Listed(values) => values.len() as u64,
@@ -119,7 +119,7 @@ impl KeyValues {
         }
     }
 
-    /// The value at a place of the grid.
+    /// The value at an index of the grid.
     fn step(&self, at: u64) -> Value {
         match self {
             Self::Listed(values) => values.get(at as usize).cloned().unwrap_or_default(),
@@ -130,7 +130,7 @@ impl KeyValues {
         }
     }
 
-    /// The value at a share from 0 to 1 of all.
+    /// The value at a share from 0 to 1 of the range.
     fn at(&self, share: f64) -> Value {
         match self {
             Self::Listed(values) => {
@@ -158,7 +158,7 @@ impl KeyValues {
     }
 }
 
-/// A number with twelve digits, whole where it is: what is written is what counts.
+/// A number with twelve digits, an integer if whole: the written text is the exact value.
 fn number(x: f64) -> Value {
     let tidy: f64 = format!("{x:.11e}").parse().unwrap_or(x);
     if tidy.fract() == 0.0 && tidy.abs() < 1e15 {
@@ -168,7 +168,7 @@ fn number(x: f64) -> Value {
     }
 }
 
-/// Numbers of a list as they are written, whole where they are.
+/// Numbers of a list as written, integers if whole.
 fn tidied(value: Value) -> Value {
     match &value {
         Value::Number(written) => written
@@ -180,7 +180,7 @@ fn tidied(value: Value) -> Value {
 }
 
 impl Sampling {
-    /// Refuses values that cannot be sampled so.
+    /// Refuses values unfit for this sampling.
     pub fn check(self, values: &KeyValues) -> Result<(), String> {
         match values {
             KeyValues::Range { steps: None, .. } if self == Self::Grid => {
@@ -197,7 +197,7 @@ impl Sampling {
         }
     }
 
-    /// Refuses what the library does not have.
+    /// Refuses sizes beyond the library.
     pub fn check_count(self, keys: &BTreeMap<String, KeyValues>) -> Result<(), String> {
         match self {
             Self::Sobol { samples, .. } if samples > MOST_SOBOL => Err(format!(
@@ -214,7 +214,7 @@ impl Sampling {
         }
     }
 
-    /// How many settings there are; `None`: more than can be counted.
+    /// Number of settings; `None` for an overflow.
     pub fn count(self, keys: &BTreeMap<String, KeyValues>) -> Option<u64> {
         match self {
             Self::Grid => keys
@@ -224,7 +224,7 @@ impl Sampling {
         }
     }
 
-    /// One of them. In a grid the last key, in the order of the alphabet, changes first.
+    /// One setting. In a grid the alphabetically last key changes first.
     pub fn setting(self, keys: &BTreeMap<String, KeyValues>, at: u64) -> KeySetting {
         match self {
             Self::Grid => {
@@ -273,7 +273,7 @@ mod tests {
             .collect()
     }
 
-    /// The values by hand: fifths of 0.8 from 0.2 on, and a factor of ten for each step.
+    /// Values by hand: fifths of 0.8 from 0.2, and a factor of ten per step.
     #[test]
     fn a_grid_has_every_value_with_every_other_one() {
         let keys = keys(
@@ -297,8 +297,8 @@ mod tests {
         assert_eq!(distinct.len(), 40);
     }
 
-    /// What makes the sequence worth its name: of 16 points each square of a grid of 4 × 4 holds
-    /// one, and each sixteenth of an axis.
+    /// Property of the sequence: each square of a 4 × 4 grid, and each sixteenth of an axis, holds
+    /// one of 16 points.
     #[test]
     fn sobol_points_fill_the_square_evenly_whatever_the_seed() {
         let keys = keys("{ a: { from: 0, to: 16 }, b: { from: 0, to: 16 } }");

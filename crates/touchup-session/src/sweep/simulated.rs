@@ -1,4 +1,4 @@
-//! Scan and touch of a known part for each seed, as the files of a recorded one.
+//! Simulated scan and touch of a known part per seed, as files like recorded ones.
 
 use std::path::{Path, PathBuf};
 
@@ -16,7 +16,7 @@ use touchup_sim::{
     plan_sides, scan, touch,
 };
 
-/// Scan and recording, written.
+/// Written files of scan and recording.
 pub(super) struct SimulatedFiles {
     pub scan: PathBuf,
     pub recording: PathBuf,
@@ -35,8 +35,8 @@ enum TruePart {
 }
 
 impl PartToTouch {
-    /// - `part`: `plate`, that of `touchup demo`, or a closed mesh, that is touched as `touchup
-    ///   simulate` does it.
+    /// - `part`: `plate`, the part of `touchup demo`, or a closed mesh, touched as in `touchup
+    ///   simulate`.
     pub fn new(part: &Path, unit: MeshUnit) -> Result<Self, SweepError> {
         if part.as_os_str() == "plate" {
             let plate = Plate::default();
@@ -75,7 +75,7 @@ impl PartToTouch {
         })
     }
 
-    /// Scans and touches it, and writes both below `folder`, in mm.
+    /// Scans and touches the part, and writes both files below `folder`, in mm.
     pub fn write(&self, seed: u64, folder: &Path) -> Result<SimulatedFiles, SweepError> {
         match &self.part {
             TruePart::Plate(plate) => self.write_surface(plate, seed, folder),

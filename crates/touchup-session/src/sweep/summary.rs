@@ -1,4 +1,4 @@
-//! What came of a job, in numbers: `summary.json` in its folder. No time, host or path is in it.
+//! Numbers of a job: `summary.json` in its folder, without time, host or path.
 
 use std::collections::BTreeMap;
 
@@ -17,39 +17,39 @@ reported! {
         feature_count: usize,
         plain: &dyn Fn(&str) -> String
     ) {
-        /// wrenches of the recording: each could be a sample
+        /// wrenches of the recording, each a possible sample
         samples: u64 = refined.samples,
         /// accepted samples
         accepted: u64 = refined.accepted,
         /// refused samples by reason; `pose_…` are lost poses and not samples
         refused: BTreeMap<String, u64> = refined.refused,
-        /// times that the stylus came into contact
+        /// number of times that the stylus came into contact
         contacts: u64 = refined.contacts,
-        /// updates made smaller because a face would have folded, before the first contact
+        /// updates reduced because a face would fold, before the first contact
         cut_back: u64 = refined.cut_back,
-        /// coefficient of friction of the ball on the part; left out when it never slid far enough
+        /// coefficient of friction of the ball on the part; absent if it never slid far enough
         friction?: f64 = refined.friction.map(|found| found.mu),
         /// standard error of the friction
         friction_sigma?: f64 = refined.friction.map(|found| found.sigma),
-        /// faces that are not where the scan had them
+        /// faces off their position in the scan
         moved_faces: u64 = refined.outcome.moved_faces,
-        /// of the refined mesh
+        /// number in the refined mesh
         vertices: usize = refined.outcome.counts[0],
-        /// of the refined mesh
+        /// number in the refined mesh
         faces: usize = refined.outcome.counts[1],
-        /// of features.json
+        /// number in features.json
         features: usize = feature_count,
         /// numbers of the remeshed part, as in `patch` and `uncertainty` of `touchup refine --json`
         #[serde(flatten)]
         reconstruction: BTreeMap<String, Value> = reconstruction(&refined.outcome),
         /// doubts about the recording, the surest first, without paths
         findings: Vec<String> = refined.findings.iter().map(|finding| plain(&finding.to_string())).collect(),
-        /// what a better recording would not lack, without paths
+        /// losses that a better recording would avoid, without paths
         losses: Vec<String> = lost.iter().map(|loss| plain(loss)).collect(),
     }
 }
 
-/// What depends on the machine, or is a list of its own.
+/// Machine-dependent keys, and lists.
 const LEFT_OUT: [&str; 2] = ["build_s", "outliers"];
 
 fn reconstruction(outcome: &Outcome) -> BTreeMap<String, Value> {

@@ -1,4 +1,4 @@
-//! What came of all jobs, as tables.
+//! Results of all jobs as tables.
 
 use std::path::Path;
 
@@ -10,23 +10,23 @@ use super::run::{FEATURES, ResultFiles};
 use touchup_io::features_file::read_features;
 use touchup_io::result_table::ResultTable;
 
-/// Missing jobs that are named at most.
+/// Maximum number of missing jobs named.
 const MOST_NAMED: usize = 20;
 
 /// Jobs and features.
 #[derive(Debug, Default)]
 pub struct SweepTables {
-    /// a row for each job that has a result, in the order of the plan
+    /// a row for each job with a result, in the order of the plan
     pub jobs: ResultTable,
-    /// a row for each feature of each of them
+    /// a row for each feature of these jobs
     pub features: ResultTable,
-    /// jobs that failed by their input; each has a row that says why
+    /// jobs that failed by their input; each has a row with the reason
     pub failed: u64,
-    /// jobs without a result …
+    /// number of jobs without a result
     pub missing: u64,
-    /// … the first of them by their numbers
+    /// numbers of the first missing jobs
     pub first_missing: Vec<u64>,
-    /// jobs whose result is no longer as it was written, each in words
+    /// jobs with a changed result, each in words
     pub damaged: Vec<String>,
 }
 
@@ -35,7 +35,7 @@ pub struct SweepTables {
 /// - `with_features`: whether features are read as well.
 ///
 /// # Errors
-/// [`SweepError`]: a line of the plan that cannot be read.
+/// [`SweepError`] for an unreadable line of the plan.
 pub fn tables_of(
     jobs: &Path,
     results: &Path,
@@ -62,7 +62,7 @@ pub fn tables_of(
         tables.failed += u64::from(failed.is_some());
         let mut row = row_of(&job, failed.as_deref());
         if tables.jobs.rows() == 0 {
-            // `seed` and `failed` also where no job is simulated, or none failed
+            // includes `seed` without simulated jobs, and `failed` without failures
             tables.jobs = ResultTable::with_columns_of(&row);
         }
         if let Value::Object(summary) = summary {
@@ -86,7 +86,7 @@ pub fn tables_of(
     Ok(tables)
 }
 
-/// Names and values of a job, and why it failed.
+/// Names and values of a job, and the reason of its failure.
 fn row_of(job: &Job, failed: Option<&str>) -> Vec<(String, Value)> {
     let text = |name: &str, value: Value| (name.to_owned(), value);
     let mut row = vec![

@@ -1,4 +1,4 @@
-//! What moved from one result to another by more than either is uncertain.
+//! Changes between two results beyond their uncertainties.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -19,16 +19,16 @@ use touchup_core::mesh::{FaceTree, TriMesh};
 use touchup_io::features_file::{FeatureRecord, read_features};
 use touchup_io::mesh_file::{MeshFile, MeshFileError, read_mesh, read_vertex_columns};
 
-/// ± is so many standard deviations: about 95 % of what is measured right lies within.
+/// Standard deviations in ±: about 95 % of correct measurements lie within.
 pub const COVERAGE: f64 = 2.0;
 
-/// Why two results were not compared.
+/// Error of comparing two results.
 #[derive(Debug, thiserror::Error)]
 pub enum WhatIfError {
-    /// One of them cannot be read.
+    /// An unreadable result.
     #[error(transparent)]
     Result(#[from] SweepError),
-    /// One of them is a failure.
+    /// A failed result.
     #[error("{} has no mesh: its job failed: {why}", path.display())]
     Failed {
         /// the folder
@@ -36,40 +36,40 @@ pub enum WhatIfError {
         /// the error of the job
         why: String,
     },
-    /// They are of two parts, or of two scans of one.
+    /// The results belong to different parts or scans.
     #[error(
         "the two results are of different scans (sha256 {a:.12}… and {b:.12}…): nothing says where one lies on the other"
     )]
     OtherScan {
-        /// hash of the one
+        /// hash of the first scan
         a: String,
-        /// … and of the other
+        /// hash of the second scan
         b: String,
     },
     /// A mesh.
     #[error(transparent)]
     Mesh(#[from] MeshFileError),
-    /// They cannot be compared.
+    /// The meshes are not comparable.
     #[error(transparent)]
     Compare(#[from] CompareError),
 }
 
-/// A result as it lies in its folder.
+/// A result in its folder.
 #[derive(Clone, Debug)]
 pub struct JobResult {
-    /// what it depends on
+    /// dependencies of the result
     pub record: JobRecord,
     /// m, in O
     pub mesh: TriMesh,
-    /// standard deviation of each vertex slot, m; `None` where the scene has no uncertainty
+    /// standard deviation of each vertex slot, m; `None` if the scene has no uncertainty
     pub sigma: Option<Vec<f64>>,
-    /// of the mesh
+    /// features of the mesh
     pub features: Vec<FeatureRecord>,
 }
 
 impl JobResult {
     /// # Errors
-    /// [`WhatIfError`]: no result, or one that failed.
+    /// [`WhatIfError`] for a missing or failed result.
     pub fn read(folder: &Path) -> Result<Self, WhatIfError> {
         let record = read_record(folder)?;
         if let Some(why) = ResultFiles::read(folder)?.failed {
@@ -94,8 +94,7 @@ impl JobResult {
     }
 }
 
-/// The keys that two records differ in, by path, with the value of each; what is not there is
-/// `Null`.
+/// The keys with different values in two records, by path; `Null` for a missing key.
 pub fn changed_keys(a: &JobRecord, b: &JobRecord) -> BTreeMap<String, [Value; 2]> {
     let [of_a, of_b] = [a, b].map(|record| {
         let mut keys = BTreeMap::new();
@@ -138,16 +137,16 @@ fn flatten(name: &str, value: &Value, into: &mut BTreeMap<String, Value>) {
     }
 }
 
-/// What is different.
+/// Differences of two results.
 #[derive(Clone, Debug)]
 pub struct WhatIf {
-    /// by path, with both values
+    /// both values by path of the key
     pub keys: BTreeMap<String, [Value; 2]>,
-    /// of each vertex slot of the first mesh
+    /// displacement of each vertex slot of the first mesh
     pub of_a: Vec<Displacement>,
-    /// of each vertex slot of the second one; `None`: both have the same vertices
+    /// displacement of each vertex slot of the second mesh; `None` if both have the same vertices
     pub of_b: Option<Vec<Displacement>>,
-    /// of each pair, and of those that only one has
+    /// changes of each pair, and features of one result only
     pub features: Vec<FeatureChange>,
 }
 
@@ -203,44 +202,43 @@ impl WhatIf {
 pub struct NumberChange {
     /// as in features.json
     pub name: &'static str,
-    /// in the first result; of a place its distance from that in the second one is `change` alone
+    /// value in the first result; `None` for a position or axis
     pub a: Option<f64>,
-    /// in the second
+    /// value in the second result
     pub b: Option<f64>,
-    /// from the first to the second; of a place or an axis how far they are apart
+    /// difference from first to second; distance of positions, angle of axes
     pub change: f64,
-    /// the larger ± of both; `None` where neither is known
+    /// the larger ± of both; `None` if neither is known
     pub plus_minus: Option<f64>,
-    /// whether the change is more; of a number without ± nothing is said
+    /// whether the change exceeds ±; false without ±
     pub moved: bool,
 }
 
 /// A feature in both results, or in one.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FeatureChange {
-    /// `hole`, `slot`, …
+    /// e.g. `hole`, `slot`
     pub kind: String,
-    /// its number in the first result
+    /// number in the first result
     pub id_a: Option<u32>,
-    /// … and in the second
+    /// number in the second result
     pub id_b: Option<u32>,
-    /// where it is, in the first result that has it, mm
+    /// position in the first result that has it, mm
     pub center_mm: Option<[f64; 3]>,
-    /// of one that both have
+    /// numbers of a feature in both results
     pub numbers: Vec<NumberChange>,
 }
 
 impl FeatureChange {
-    /// Whether a number of it moved, or one result lacks it.
+    /// Whether one of its numbers moved, or one result lacks it.
     pub fn is_moved(&self) -> bool {
         self.id_a.is_none() || self.id_b.is_none() || self.numbers.iter().any(|number| number.moved)
     }
 }
 
-/// Two features are one when they are of a kind and nearer than this, mm, and no other one is
-/// nearer.
+/// Maximum distance of a feature pair, mm: same kind, and no other feature nearer.
 const NEAR_MM: f64 = 1.5;
-/// … and their axes are within 30°.
+/// Minimum cosine between the axes of a pair: within 30°.
 const SAME_AXIS: f64 = 0.866;
 
 fn far(a: &FeatureRecord, b: &FeatureRecord) -> Option<f64> {
@@ -252,7 +250,7 @@ fn far(a: &FeatureRecord, b: &FeatureRecord) -> Option<f64> {
             .abs()
     });
     let is_same = a.kind == b.kind && axes.is_none_or(|cosine| cosine > SAME_AXIS);
-    // a plane is anywhere in itself: its middle moves with what was touched of it
+    // a plane extends in itself: its centre moves with the touches on it
     let normal = a
         .axis
         .filter(|_| a.kind == "plane")
@@ -263,7 +261,7 @@ fn far(a: &FeatureRecord, b: &FeatureRecord) -> Option<f64> {
     (is_same && off < NEAR_MM).then_some(off)
 }
 
-/// The middle of a plane may be so many times farther off within it.
+/// Ratio of a plane's permitted centre shifts, within it to along its normal.
 const PLANE_SPREAD: f64 = 10.0;
 
 /// Pairs features, the nearest first, and compares them.
@@ -304,6 +302,17 @@ fn change(a: Option<&FeatureRecord>, b: Option<&FeatureRecord>, k: f64) -> Featu
     }
 }
 
+/// A number of a feature.
+type NumberOf = fn(&FeatureRecord) -> Option<f64>;
+
+const NUMBERS: [(&str, NumberOf); 5] = [
+    ("diameter_mm", |one| one.diameter_mm),
+    ("length_mm", |one| one.length_mm),
+    ("width_mm", |one| one.width_mm),
+    ("depth_mm", |one| one.depth_mm),
+    ("cone_angle_deg", |one| one.cone_angle_deg),
+];
+
 fn numbers(a: &FeatureRecord, b: &FeatureRecord, k: f64) -> Vec<NumberChange> {
     let changed = |name: &'static str, values: [Option<f64>; 2], change: f64| {
         let stds = [a, b].map(|one| one.std.get(name).copied());
@@ -324,8 +333,8 @@ fn numbers(a: &FeatureRecord, b: &FeatureRecord, k: f64) -> Vec<NumberChange> {
     };
     let place = a.center_mm.zip(b.center_mm).map(|(p, q)| {
         let apart = nalgebra::Vector3::from(q) - nalgebra::Vector3::from(p);
-        // its standard uncertainty is across the axis, of a plane along its normal, of a corner in
-        // space
+        // the standard uncertainty is across the axis, for a plane along its normal, for a corner
+        // in space
         let axis = a.axis.map(nalgebra::Vector3::from);
         let off = match (axis, &*a.kind) {
             (Some(axis), "plane") => apart.dot(&axis).abs(),
@@ -362,7 +371,7 @@ mod tests {
     }
 
     /// By hand: 6.00 and 6.05 with ± 2 · 0.02 moved, with ± 2 · 0.03 not; 0.3 mm along the axis is
-    /// no change of place.
+    /// no change of position.
     #[test]
     fn a_number_moves_when_it_changes_by_more_than_the_larger_plus_minus() {
         let a = [

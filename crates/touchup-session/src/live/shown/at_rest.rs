@@ -1,5 +1,4 @@
-//! What is shown while nothing is touched: the scan with the patch of all touches in it, as a file
-//! of the result has it.
+//! Shown mesh of a pause in touching: the scan with the patch of all touches, as in a result file.
 
 use std::collections::HashMap;
 
@@ -10,19 +9,19 @@ use super::followed::{
     FaceShown, FollowedScan, Scans, VERTICES_OF_A_CHANGE, remove_from, return_to,
 };
 
-/// The patch of all touches, as far as it is shown.
+/// The patch of all touches, and its progress in the shown mesh.
 #[derive(Debug, Default)]
 pub(super) struct AtRest {
     phase: RestPhase,
-    /// the patch that is to be shown once the working mesh is followed
+    /// the patch to show once the shown mesh has followed the working mesh
     wanted: Option<PatchDelta>,
-    /// … and the one that is
+    /// the shown patch
     patch: PatchDelta,
-    /// edits of the working mesh when it was left
+    /// number of edits of the working mesh at departure from it
     edits: u64,
-    /// what is still to be done, the last first
+    /// pending steps, the last first
     steps: Vec<Step>,
-    /// what to do when the working mesh is followed again
+    /// steps back to the working mesh
     back: Vec<Step>,
     /// vertices of `patch`, in its order
     placed: Vec<VertexId>,
@@ -31,50 +30,50 @@ pub(super) struct AtRest {
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum RestPhase {
-    /// the working mesh is followed
+    /// the shown mesh follows the working mesh
     #[default]
     Following,
-    /// the patch of all touches is shown, or becomes so
+    /// the patch of all touches is visible, or becomes so
     Resting,
-    /// the working mesh comes back
+    /// the working mesh returns
     Leaving,
 }
 
-/// Of some vertices or faces at once.
+/// A step for some vertices or faces at once.
 #[derive(Clone, Copy, Debug)]
 enum Step {
-    /// the face of the working mesh goes
+    /// removes a face of the working mesh
     Park(FaceId),
-    /// … and comes again
+    /// shows a face of the working mesh again
     Follow(FaceId),
-    /// what a face of the simplified scan stands for comes
+    /// restores the scan faces of a face of the simplified scan
     BringBack(FaceId),
-    /// … and goes again
+    /// removes the scan faces of a face of the simplified scan
     Hide(FaceId),
-    /// the vertices of a cell go where the scan has them
+    /// moves the vertices of a cell to their positions in the scan
     PutBack(u32),
-    /// … and where the working mesh has them
+    /// moves the vertices of a cell to the working mesh
     Carry(u32),
-    /// a vertex of the working mesh goes; it comes again with its faces
+    /// removes a vertex of the working mesh; it returns with its faces
     Forget(VertexId),
-    /// the next vertex of the patch comes, or one of the scan goes where the patch has it
+    /// adds the next vertex of the patch, or moves a scan vertex to its position in the patch
     Place(u32),
-    /// … and one that came goes again
+    /// removes a vertex of the patch
     Unplace(VertexId),
-    /// … and one of the scan goes back
+    /// moves a scan vertex back
     Return(VertexId),
-    /// a face of the scan goes that the patch replaces
+    /// removes a scan face that the patch replaces
     Cut(FaceId),
-    /// … and comes again
+    /// restores a scan face that the patch replaced
     Restore(FaceId),
-    /// a face of the patch comes
+    /// adds a face of the patch
     Fill(u32),
-    /// … and goes again
+    /// removes a face of the patch
     Empty(FaceId),
 }
 
 impl AtRest {
-    /// Whether the patch of all touches is shown, all of it.
+    /// Whether the shown mesh contains the whole patch of all touches.
     pub fn is_there(&self) -> bool {
         self.phase == RestPhase::Resting && self.steps.is_empty()
     }
@@ -84,8 +83,8 @@ impl AtRest {
         self.support.get(&vertex).copied()
     }
 
-    /// The patch of all touches so far is to be shown, from when the working mesh is followed until
-    /// it changes again.
+    /// Requests the patch of all touches once the shown mesh has followed the working mesh, until
+    /// that changes.
     pub fn want(&mut self, patch: PatchDelta, working: &TriMesh) {
         let Self {
             phase,
@@ -101,13 +100,13 @@ impl AtRest {
         *wanted = (!is_shown).then_some(patch);
     }
 
-    /// Whether the patch of all touches is shown, or about to be.
+    /// Whether the patch of all touches is visible, or about to be.
     pub fn is_wanted(&self, working: &TriMesh) -> bool {
         self.wanted.is_some() || self.phase == RestPhase::Resting && self.edits == working.edits()
     }
 
-    /// Where the patch of all touches is wanted, begins with it; returns whether there is anything
-    /// to do for it.
+    /// Begins with a requested patch of all touches; returns whether there is anything to do for
+    /// it.
     pub fn begin(&mut self, followed: &FollowedScan, scans: Scans<'_>, working: &TriMesh) -> bool {
         let Some(patch) = self.wanted.take() else {
             return false;
@@ -128,7 +127,7 @@ impl AtRest {
                 .map(Step::Park),
         );
         steps.extend(hidden.map(Step::BringBack));
-        // in an order that does not hang on the table
+        // sorted, as the order of the table is random
         let mut moved: Vec<u32> = followed.moved.iter().copied().collect();
         moved.sort_unstable();
         steps.extend(moved.into_iter().map(Step::PutBack));
@@ -148,8 +147,8 @@ impl AtRest {
         true
     }
 
-    /// Goes on from the working mesh to the patch of all touches or back, by up to `most` steps;
-    /// returns whether that was all.
+    /// Takes up to `most` steps from the working mesh to the patch of all touches or back; returns
+    /// whether none is left.
     ///
     /// # Errors
     /// [`MeshError::TooMany`].
@@ -194,7 +193,7 @@ impl AtRest {
         Ok(false)
     }
 
-    /// Takes a step, and notes the one that takes it back.
+    /// Takes a step, and notes its reverse.
     #[expect(clippy::too_many_lines)]
     fn take_step(
         &mut self,

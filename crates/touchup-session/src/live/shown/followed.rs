@@ -1,4 +1,4 @@
-//! A scan that follows the mesh that was made of its simplified one.
+//! A scan that follows the mesh refined from its simplified copy.
 
 use std::collections::{HashMap, HashSet};
 
@@ -9,49 +9,48 @@ use touchup_core::mesh::{
 };
 use touchup_core::reconstruct::Support;
 
-/// Vertices of the scan that are moved for one change of a vertex of the working mesh, about.
+/// Approximate number of scan vertices to move per changed vertex of the working mesh.
 pub(super) const VERTICES_OF_A_CHANGE: usize = 8;
 
-/// What a face of the working mesh is shown as.
+/// Appearance of a face of the working mesh in the shown mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum FaceShown {
-    /// not there
+    /// absent
     Gone,
-    /// one of the simplified scan: by the faces of the scan that it stands for
+    /// a face of the simplified scan: as the scan faces that it stands for
     Detail(FaceId),
-    /// by a face of its own
+    /// as a face of its own
     Same(FaceId),
 }
 
-/// The scan, and how it follows the working mesh.
+/// The scan, and its way to follow the working mesh.
 #[derive(Debug)]
 pub(super) struct FollowedScan {
     pub mesh: TriMesh,
-    /// vertices and faces of the scan by the cell that they (or their first corners) are in
+    /// vertices and faces of the scan by the cell of their position or first corner
     pub vertices: Groups,
     faces: Groups,
-    /// faces of the scan that each face of the simplified scan stands for, once its cells are
-    /// parted
+    /// scan faces of each face of the simplified scan, once its cells are partitioned
     pub parts: Vec<Vec<FaceId>>,
     is_parted: Vec<bool>,
     /// by face slot of the working mesh
     pub shown: Vec<FaceShown>,
-    /// where faces of the scan are that were gone and came back
+    /// current ids of scan faces removed and added again
     pub returned: HashMap<FaceId, FaceId>,
-    /// vertices of the shown mesh that are not of the scan, by vertex slot of the working mesh …
+    /// vertices of the shown mesh beyond the scan, by vertex slot of the working mesh
     pub added: Vec<Option<VertexId>>,
-    /// … and the other way
+    /// vertex of the working mesh by added vertex
     working: HashMap<VertexId, VertexId>,
-    /// removed from the working mesh, while faces that are to follow still use them
+    /// removed from the working mesh, but still in use by faces yet to follow
     leaving: Vec<VertexId>,
-    /// cells whose vertices are to be moved …
+    /// cells with vertices to move
     pub moving: IdSet,
-    /// … and those whose vertices are not all where the scan has them
+    /// cells with vertices off their position in the scan
     pub moved: HashSet<u32>,
     changes: Changes,
 }
 
-/// The scan, and what stands for it.
+/// A scan and its simplified copy.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::live) struct Scans<'a> {
     pub original: &'a TriMesh,
@@ -59,7 +58,7 @@ pub(in crate::live) struct Scans<'a> {
 }
 
 impl FollowedScan {
-    /// The scan as it is.
+    /// The scan itself.
     pub fn new(
         Scans {
             original,
@@ -98,8 +97,8 @@ impl FollowedScan {
         }
     }
 
-    /// Takes up to `most` changes of each kind of the working mesh over; returns whether that was
-    /// all.
+    /// Takes over up to `most` changes of each kind from the working mesh; returns whether none is
+    /// left.
     ///
     /// # Errors
     /// [`MeshError::TooMany`].
@@ -127,7 +126,7 @@ impl FollowedScan {
         Ok(is_all && self.moving.is_empty())
     }
 
-    /// The support of a vertex of the patch, by the working mesh; `None`: it is one of the scan.
+    /// The support of a vertex of the patch, by the working mesh; `None` for a vertex of the scan.
     pub fn support(&self, refiner: &Refiner, vertex: VertexId) -> Option<Support> {
         refiner.support(*self.working.get(&vertex)?)
     }
@@ -210,7 +209,7 @@ impl FollowedScan {
         }
     }
 
-    /// The vertex that shows one of the working mesh for which the scan has none.
+    /// The vertex that shows a vertex of the working mesh beyond the scan.
     fn add(&mut self, working: &TriMesh, vertex: VertexId) -> Result<VertexId, MeshError> {
         let at = vertex.0 as usize;
         if at >= self.added.len() {
@@ -225,7 +224,7 @@ impl FollowedScan {
         Ok(added)
     }
 
-    /// Removes what shows a vertex that is gone; whether no face uses it any more.
+    /// Removes the shown vertex of a removed vertex; whether no face uses it any more.
     pub fn remove(&mut self, vertex: VertexId) -> bool {
         let Some(added) = self.added[vertex.0 as usize] else {
             return true;
@@ -253,8 +252,8 @@ impl FollowedScan {
         Ok(())
     }
 
-    /// Finds the faces of the scan that the faces around the corners of `detail` stand for: each is
-    /// given to the nearest.
+    /// Assigns the scan faces around the corners of `detail` to the nearest faces of the simplified
+    /// scan.
     fn part(&mut self, scans: Scans<'_>, detail: FaceId) {
         let (scan, simplified) = (scans.original, &scans.simplified.mesh);
         for cell in simplified.corners(detail) {
@@ -276,7 +275,7 @@ impl FollowedScan {
         }
     }
 
-    /// Moves the vertices of cells whose surroundings have moved, about `most` of them.
+    /// Moves the vertices of cells with moved surroundings, about `most` of them.
     fn carry(&mut self, scans: Scans<'_>, working: &TriMesh, most: usize) {
         let mut left = most;
         while left > 0 && !self.moving.is_empty() {
@@ -311,7 +310,7 @@ pub(super) fn remove_from(
     mesh.remove_face(returned.remove(&face).unwrap_or(face));
 }
 
-/// Puts a face of the scan back that was removed.
+/// Restores a removed face of the scan.
 pub(super) fn return_to(
     mesh: &mut TriMesh,
     returned: &mut HashMap<FaceId, FaceId>,

@@ -1,6 +1,6 @@
-//! Ids by the group that they are in.
+//! Ids by group.
 
-/// Ids by group, those of one after another.
+/// Ids by group, contiguous per group.
 #[derive(Debug)]
 pub(super) struct Groups {
     starts: Vec<u32>,
@@ -8,7 +8,7 @@ pub(super) struct Groups {
 }
 
 impl Groups {
-    /// - `group_of`: of each id below `count`, if it has one.
+    /// - `group_of`: the group of each id below `count`, if any.
     pub fn new(groups: usize, count: usize, group_of: impl Fn(u32) -> Option<u32>) -> Self {
         let mut starts = vec![0u32; groups + 1];
         (0..count as u32)

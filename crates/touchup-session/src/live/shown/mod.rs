@@ -1,6 +1,6 @@
-//! The mesh that is shown where haptic update and patch work on a simplified scan: the faces of the
-//! scan where nothing was replaced, moved along with the simplified ones, and the faces of the
-//! patch. At rest it is the scan with the patch of all touches.
+//! The shown mesh if haptic update and patch work on a simplified scan: the faces of the scan,
+//! moved with the simplified ones, and the faces of the patch in place of replaced ones. At rest it
+//! is the scan with the patch of all touches.
 
 mod at_rest;
 mod followed;
@@ -21,7 +21,7 @@ pub(super) struct Shown {
 }
 
 impl Shown {
-    /// The scan as it is.
+    /// The scan itself.
     pub fn new(scans: Scans<'_>) -> Self {
         Self {
             followed: FollowedScan::new(scans),
@@ -29,13 +29,13 @@ impl Shown {
         }
     }
 
-    /// The mesh as far as it has followed.
+    /// The mesh in its current state.
     pub fn mesh(&self) -> &TriMesh {
         &self.followed.mesh
     }
 
-    /// Takes up to `most` changes of each kind of the working mesh over, or where it rests of the
-    /// patch of all touches; returns whether that was all.
+    /// Takes over up to `most` changes of each kind from the working mesh, or at rest from the
+    /// patch of all touches; returns whether none is left.
     ///
     /// # Errors
     /// [`MeshError::TooMany`].
@@ -61,18 +61,18 @@ impl Shown {
         self.followed.mesh.take_changes(most, into)
     }
 
-    /// The patch of all touches so far is to be shown, from when the working mesh is followed until
-    /// it changes again.
+    /// Requests the patch of all touches once the shown mesh has followed the working mesh, until
+    /// that changes.
     pub fn rest(&mut self, patch: PatchDelta, working: &TriMesh) {
         self.at_rest.want(patch, working);
     }
 
-    /// Whether the patch of all touches is shown, or about to be, as [`Self::follow`] goes on.
+    /// Whether the patch of all touches is visible, or will be by [`Self::follow`].
     pub fn rests(&self, working: &TriMesh) -> bool {
         self.at_rest.is_wanted(working)
     }
 
-    /// The support of a vertex of the patch, by what is shown; `None`: it is one of the scan.
+    /// The support of a vertex of the patch, in the shown mesh; `None` for a vertex of the scan.
     pub fn support(&self, refiner: &Refiner, vertex: VertexId) -> Option<Support> {
         self.at_rest
             .support(vertex)

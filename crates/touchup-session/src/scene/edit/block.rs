@@ -1,17 +1,17 @@
-//! Mappings by indentation: one key a line.
+//! Mappings by indentation: one key per line.
 
 use std::ops::Range;
 
 use super::flow;
 
-/// What a remark of this program begins with; one that is there already is replaced.
+/// Beginning of a remark of this program; a new remark replaces an old one.
 pub(super) const MARK: &str = "# touchup calibrate";
 
-/// Spaces that a new level is set in by.
+/// Spaces per level.
 const STEP: usize = 2;
 
-/// The text with `path` set to `value`; the line of the key ends with `remark` where it has no
-/// comment of its own.
+/// The text with `path` set to `value`; the line of the key ends with `remark`, unless it has
+/// another comment.
 pub(super) fn set(text: &str, path: &[&str], value: &str, remark: &str) -> Option<String> {
     let lines: Vec<&str> = text.split_inclusive('\n').collect();
     let whole = 0..lines
@@ -26,7 +26,7 @@ pub(super) fn set(text: &str, path: &[&str], value: &str, remark: &str) -> Optio
     set_in(&lines, whole, indent, path, value, remark)
 }
 
-/// Sets it in the mapping in the lines of `range`, its keys set in by `indent`.
+/// Sets the value in the mapping of the lines of `range`, with keys at `indent`.
 #[expect(clippy::too_many_lines)]
 fn set_in(
     lines: &[&str],
@@ -102,8 +102,8 @@ fn set_in(
     }
 }
 
-/// Where a new key of the mapping in `range` goes: behind its last line, be that a comment that is
-/// set in as its keys are.
+/// Line for a new key of the mapping in `range`: after its last line, including comments at the
+/// indentation of its keys.
 fn end_of(lines: &[&str], range: Range<usize>, indent: usize) -> usize {
     let is_part = |at: &usize| !lines[*at].trim().is_empty() && indent_of(lines[*at]) >= indent;
     range
@@ -113,8 +113,8 @@ fn end_of(lines: &[&str], range: Range<usize>, indent: usize) -> usize {
         .map_or(range.start, |at| at + 1)
 }
 
-/// Behind the last line of the value of a key: deeper ones, and items of a list at its own depth.
-/// Comments and empty lines at the end belong to the next key, unless they are deeper.
+/// Line after the value of a key: deeper lines, and list items at its own depth. Comments and empty
+/// lines at the end belong to the next key, unless they are deeper.
 fn body_end(lines: &[&str], range: Range<usize>, indent: usize) -> usize {
     let is_item = |line: &str| indent_of(line) == indent && line.trim_start().starts_with('-');
     let is_inside = |line: &str| indent_of(line) > indent || is_item(line);
@@ -153,7 +153,7 @@ fn inserted(lines: &[&str], at: usize, new: &str) -> String {
     before + end + new + &lines[at..].concat()
 }
 
-/// Just behind the colon, when the line holds `key` at this depth.
+/// Position after the colon, if the line holds `key` at this depth.
 fn key_end(line: &str, indent: usize, key: &str) -> Option<usize> {
     if indent_of(line) != indent {
         return None;
@@ -169,7 +169,7 @@ fn key_end(line: &str, indent: usize, key: &str) -> Option<usize> {
         .then_some(indent + written.len() + colon + 1)
 }
 
-/// Value and comment behind a colon; a `#` in quotes is none.
+/// Value and comment after a colon; a `#` in quotes begins no comment.
 fn split_comment(text: &str) -> (&str, &str) {
     let (mut quote, mut before) = (None, ' ');
     for (at, c) in text.char_indices() {
@@ -186,7 +186,7 @@ fn split_comment(text: &str) -> (&str, &str) {
     (text.trim(), "")
 }
 
-/// Neither empty nor a comment nor a mark of the document.
+/// Whether the line is neither empty nor a comment nor a document mark.
 fn is_content(line: &str) -> bool {
     let text = line.trim();
     !text.is_empty() && !text.starts_with(['#', '%']) && text != "---"

@@ -1,6 +1,6 @@
 //! Mappings in braces: `{ key: value, … }`, over one line or several.
 
-/// Where the mapping begins, when the whole text is one in braces.
+/// Start of the mapping, if the whole text is one mapping in braces.
 pub(super) fn start(text: &str) -> Option<usize> {
     let mut at = 0;
     for line in text.split_inclusive('\n') {
@@ -15,7 +15,7 @@ pub(super) fn start(text: &str) -> Option<usize> {
     None
 }
 
-/// The text with `path` set to `value` in the mapping whose brace is at `begin`.
+/// The text with `path` set to `value` in the mapping with its brace at `begin`.
 pub(super) fn set(text: &str, begin: usize, path: &[&str], value: &str) -> Option<String> {
     let (first, rest) = path.split_first()?;
     let Mapping {
@@ -50,7 +50,7 @@ fn spliced(text: &str, begin: usize, end: usize, new: &str) -> String {
     format!("{}{new}{}", &text[..begin], &text[end..])
 }
 
-/// One key, and the range of its value, up to its last character.
+/// A key, and the range of its value, up to its last character.
 struct FlowEntry<'a> {
     key: &'a str,
     begin: usize,
@@ -59,14 +59,14 @@ struct FlowEntry<'a> {
 
 struct Mapping<'a> {
     entries: Vec<FlowEntry<'a>>,
-    /// just behind the last thing that is no comment
+    /// position after the last content that is no comment
     last: usize,
-    /// a comma or the opening brace is there
+    /// whether a comma or the opening brace precedes
     is_separated: bool,
 }
 
 impl<'a> Mapping<'a> {
-    /// Up to the closing brace; `None` when there is none.
+    /// Reads up to the closing brace; `None` without one.
     fn read(text: &'a str, begin: usize) -> Option<Self> {
         let mut mapping = Self {
             entries: Vec::new(),
