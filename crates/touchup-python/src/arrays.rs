@@ -1,4 +1,4 @@
-//! Arrays of NumPy as meshes, messages and touches, and back.
+//! Converts NumPy arrays to meshes, messages and touches, and back.
 
 use std::borrow::Cow;
 
@@ -33,14 +33,13 @@ pub type WrenchArrays<'py> = (
     PyReadonlyArray2<'py, f64>,
     PyReadonlyArray2<'py, f64>,
 );
-/// Vertices and faces as they are worked on.
+/// Vertices and faces as vectors.
 pub type MeshVecs = (Vec<Point3<f64>>, Vec<[u32; 3]>);
 
-/// The rows of an array of `N` columns: as they lie in memory where they follow each other there,
-/// else a copy.
+/// The rows of an array of `N` columns: borrowed if contiguous in memory, else a copy.
 ///
 /// # Errors
-/// Where it has another shape.
+/// For another shape.
 pub fn rows<'a, const N: usize, T: Element + Copy + Default>(
     array: &'a PyReadonlyArray2<'_, T>,
     name: &str,
@@ -66,10 +65,10 @@ pub fn rows<'a, const N: usize, T: Element + Copy + Default>(
     Ok(Cow::Owned(view.rows().into_iter().map(row).collect()))
 }
 
-/// Refuses arrays of one table that differ in length.
+/// Refuses arrays of one table with different lengths.
 ///
 /// # Errors
-/// Where they do.
+/// For different lengths.
 pub fn of_equal_length(first: (&str, usize), others: &[(&str, usize)]) -> Result<(), CliError> {
     match others.iter().find(|(_, length)| *length != first.1) {
         None => Ok(()),
@@ -83,7 +82,7 @@ pub fn of_equal_length(first: (&str, usize), others: &[(&str, usize)]) -> Result
 /// Vertices and faces.
 ///
 /// # Errors
-/// Where one has another shape.
+/// For another shape.
 pub fn mesh_vecs((vertices, faces): &MeshArrays<'_>, name: &str) -> Result<MeshVecs, CliError> {
     let vertices = rows::<3, f64>(vertices, &format!("vertices of {name}"))?;
     let faces = rows::<3, u32>(faces, &format!("faces of {name}"))?;
@@ -93,10 +92,10 @@ pub fn mesh_vecs((vertices, faces): &MeshArrays<'_>, name: &str) -> Result<MeshV
     ))
 }
 
-/// A mesh as it is, without repair, so that vertices keep their numbers.
+/// A mesh without repair, so that vertices keep their numbers.
 ///
 /// # Errors
-/// As [`mesh_vecs`], and those of [`TriMesh::new`].
+/// Those of [`mesh_vecs`] and [`TriMesh::new`].
 pub fn mesh_of(arrays: &MeshArrays<'_>, name: &str) -> Result<TriMesh, CliError> {
     let (vertices, faces) = mesh_vecs(arrays, name)?;
     let mesh = TriMesh::new(vertices, faces)?;
@@ -106,8 +105,7 @@ pub fn mesh_of(arrays: &MeshArrays<'_>, name: &str) -> Result<TriMesh, CliError>
     Ok(mesh)
 }
 
-/// A mesh without what was removed, as it would be in a file, and a number of each vertex beside
-/// it.
+/// A mesh without removed elements, as in a file, with the slot of each vertex.
 pub struct Compact {
     vertices: Vec<[f64; 3]>,
     faces: Vec<[u32; 3]>,
@@ -116,7 +114,7 @@ pub struct Compact {
 }
 
 impl Compact {
-    /// Vertices that faces use, and the faces, in their order.
+    /// Vertices in use by faces, and the faces, in their order.
     pub fn of(mesh: &TriMesh) -> Self {
         const UNUSED: u32 = u32::MAX;
         let mut numbers = vec![UNUSED; mesh.vertex_slots()];
@@ -144,7 +142,7 @@ impl Compact {
         }
     }
 
-    /// A number of each vertex out of one of each slot; nothing of nothing.
+    /// Values per vertex from values per slot; `None` for an empty slice.
     pub fn column<T: Copy>(&self, of_slots: &[T]) -> Option<Vec<T>> {
         (!of_slots.is_empty()).then(|| self.slots.iter().map(|&slot| of_slots[slot]).collect())
     }
@@ -171,7 +169,7 @@ pub fn matrix<const N: usize, T: Element>(
     PyArray1::from_vec(py, rows.into_flattened()).reshape([count, N])
 }
 
-/// A rigid motion of position and orientation; `None` for what is no rotation.
+/// A rigid motion of position and orientation; `None` for an invalid rotation.
 #[inline]
 pub fn pose(position: [f64; 3], [x, y, z, w]: [f64; 4]) -> Option<Isometry3<f64>> {
     let rotation = measured_rotation(Quaternion::new(w, x, y, z))?;
@@ -181,7 +179,7 @@ pub fn pose(position: [f64; 3], [x, y, z, w]: [f64; 4]) -> Option<Isometry3<f64>
     ))
 }
 
-/// A sample of numbers.
+/// A sample from numbers.
 ///
 /// # Errors
 /// [`SampleError::NotARotation`], [`SampleError::NotFinite`] for the orientation.
@@ -217,7 +215,7 @@ fn no_rotation(stamp_ns: i64, xyzw: [f64; 4]) -> SampleError {
 /// Poses and wrenches as messages, merged by their stamps.
 ///
 /// # Errors
-/// For another shape, and for what is no rotation.
+/// For another shape, and for an invalid rotation.
 pub fn messages(
     poses: &PoseArrays<'_>,
     wrenches: &WrenchArrays<'_>,
@@ -256,7 +254,7 @@ pub fn messages(
         };
         all.push(Message::Wrench(StampedWrench { stamp_ns, wrench }));
     }
-    // stable: of one stamp the pose stays first
+    // stable: a pose stays before a wrench of equal stamp
     all.sort_by_key(Message::stamp_ns);
     Ok(all)
 }
@@ -270,7 +268,7 @@ fn recording_error(error: SampleError, what: &str, row: usize) -> CliError {
     }
 }
 
-/// In which axes wrenches are.
+/// Axes of the wrenches.
 ///
 /// # Errors
 /// For another word.
@@ -341,10 +339,10 @@ pub fn messages_into(
     )
 }
 
-/// What an array has of each touch, by its name.
+/// Name of an array, and its value for a touch.
 type Column<T> = (&'static str, fn(&ProbedPoint) -> T);
 
-/// Touches as one array: a row for each, in the columns of [`touches_of`].
+/// Touches as a dictionary of arrays, with the columns of [`touches_of`].
 ///
 /// # Errors
 /// Those of NumPy.
@@ -386,10 +384,10 @@ pub fn touches_array<'py>(
     Ok(into)
 }
 
-/// Touches of a dictionary of arrays, as [`touches_array`] makes it.
+/// Touches from a dictionary of arrays, as of [`touches_array`].
 ///
 /// # Errors
-/// Where an array is missing, or of another type or shape.
+/// For a missing array, or another type or shape.
 pub fn touches_of(from: &Bound<'_, PyDict>) -> PyResult<Result<Vec<ProbedPoint>, CliError>> {
     let item = |name: &str| {
         from.get_item(name)?
@@ -449,9 +447,9 @@ pub fn touches_of(from: &Bound<'_, PyDict>) -> PyResult<Result<Vec<ProbedPoint>,
     Ok(Ok((0..stamps.len()).map(touch).collect()))
 }
 
-/// A value of JSON as its text; the package reads it.
+/// A value as JSON text, for the package.
 pub fn json(value: &impl serde::Serialize) -> Result<String, CliError> {
-    // what is reported holds finite numbers and names alone
+    // a report holds only finite numbers and names
     serde_json::to_string(value)
         .map_err(|error| usage(format!("the report cannot be written: {error}")))
 }

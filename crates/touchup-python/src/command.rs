@@ -9,7 +9,7 @@ use tracing_subscriber::filter::Targets;
 use tracing_subscriber::layer::SubscriberExt;
 use tracing_subscriber::util::SubscriberInitExt;
 
-/// Runs the command line, the program's own name first, and returns its exit code: 0 done, 1 result
+/// Runs the command line, with the program name first, and returns its exit code: 0 done, 1 result
 /// not written, 2 wrong usage, 3 bad input file, 4 done with losses, 5 the arm stopped, 130 a
 /// signal stopped it. Results go to stdout, all else to stderr.
 #[pyfunction]

@@ -1,5 +1,5 @@
-//! Errors as exceptions in the words of the command line, and warnings of the log as warnings of
-//! Python.
+//! Converts errors to exceptions in the words of the command line, and log warnings to Python
+//! warnings.
 
 use std::ffi::CString;
 use std::fmt::Write;
@@ -27,7 +27,7 @@ pyo3::create_exception!(
     "What was done and is doubtful, or what a better input would not lack."
 );
 
-/// Warnings of one call at most; the rest is counted.
+/// Maximum number of warnings per call; a last line counts the rest.
 const MOST_WARNINGS: usize = 100;
 
 /// The exception of an error.
@@ -49,7 +49,7 @@ pub fn exception(py: Python<'_>, error: CliError) -> PyErr {
     }
 }
 
-/// What a caller got wrong.
+/// An error of the caller.
 pub fn usage(message: String) -> CliError {
     CliError {
         kind: "usage",
@@ -59,11 +59,10 @@ pub fn usage(message: String) -> CliError {
     }
 }
 
-/// Does `work` while other threads may have the interpreter; what it warns of comes as warnings
-/// after it.
+/// Runs `work` without holding the interpreter; its log warnings follow as Python warnings.
 ///
 /// # Errors
-/// Its error as an exception; a warning that the user has turned into one.
+/// The error of `work` as an exception, or a warning that the user turned into one.
 pub fn at_work<T: Send>(
     py: Python<'_>,
     work: impl FnOnce() -> Result<T, CliError> + Send,
@@ -81,7 +80,7 @@ pub fn at_work<T: Send>(
 /// Warns of each line.
 ///
 /// # Errors
-/// A warning that the user has turned into an exception.
+/// A warning that the user turned into an exception.
 pub fn warn(py: Python<'_>, lines: &[String]) -> PyResult<()> {
     let category = py.get_type::<TouchupWarning>();
     for line in lines {
@@ -91,7 +90,7 @@ pub fn warn(py: Python<'_>, lines: &[String]) -> PyResult<()> {
     Ok(())
 }
 
-/// Lines of the log that warn.
+/// Warning lines of the log.
 #[derive(Clone, Default)]
 struct WarningLines {
     lines: Arc<Mutex<Vec<String>>>,
@@ -112,7 +111,7 @@ impl WarningLines {
 
 impl<S: Subscriber> Layer<S> for WarningLines {
     fn on_event(&self, event: &Event<'_>, _: Context<'_, S>) {
-        // of the program's crates, this one included, whose name begins with `_`
+        // only the program's crates, including this one, whose name begins with `_`
         if !event
             .metadata()
             .target()
@@ -130,12 +129,12 @@ impl<S: Subscriber> Layer<S> for WarningLines {
     }
 }
 
-/// The message, and its fields behind it.
+/// The message, followed by its fields.
 struct LineOfEvent(String);
 
 impl Visit for LineOfEvent {
     fn record_debug(&mut self, field: &Field, value: &dyn std::fmt::Debug) {
-        // a String takes all that is written
+        // writing to a String never fails
         let _ = match field.name() {
             "message" => write!(self.0, "{value:?}"),
             name => write!(self.0, " {name}={value:?}"),

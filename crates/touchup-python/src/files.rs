@@ -1,4 +1,4 @@
-//! Meshes, recordings and touches of files.
+//! Meshes, recordings and touches in files.
 
 use std::path::PathBuf;
 
@@ -29,10 +29,10 @@ pub fn unit_of(name: &str) -> Result<MeshUnit, CliError> {
         .ok_or_else(|| usage(format!("unit {name:?} must be \"mm\", \"m\" or \"inch\"")))
 }
 
-/// Where in a recording the poses and wrenches are, as JSON.
+/// Location of poses and wrenches in a recording, from JSON.
 ///
 /// # Errors
-/// For a name that there is not.
+/// For an unknown name.
 pub fn recorded_as(json: &str) -> Result<(RecordedAs, StampSource), CliError> {
     let recorded: RecordedAs =
         serde_json::from_str(json).map_err(|error| usage(error.to_string()))?;
@@ -42,8 +42,8 @@ pub fn recorded_as(json: &str) -> Result<(RecordedAs, StampSource), CliError> {
 
 /// Reads a mesh, or a point cloud as one, and repairs it.
 ///
-/// Returns `vertices` (V, 3) m, `faces` (F, 3), `sigma` (V,) m and `support` (V,) where the file
-/// has them, and what was repaired.
+/// Returns `vertices` (V, 3) m, `faces` (F, 3), `sigma` (V,) m and `support` (V,) if the file has
+/// them, and the repairs.
 #[pyfunction]
 pub fn read_mesh<'py>(py: Python<'py>, path: PathBuf, unit: &str) -> PyResult<Bound<'py, PyDict>> {
     let (mesh, repair, columns) = at_work(py, || {
@@ -72,7 +72,7 @@ pub fn read_mesh<'py>(py: Python<'py>, path: PathBuf, unit: &str) -> PyResult<Bo
     Ok(into)
 }
 
-/// Puts what is known of each vertex into a dictionary.
+/// Puts the uncertainty and support of each vertex into a dictionary.
 ///
 /// # Errors
 /// Those of NumPy.
@@ -177,8 +177,7 @@ pub fn read_recording<'py>(
     Ok(into)
 }
 
-/// Writes poses and wrenches as MCAP, on the topics that the command line reads unless flags name
-/// others.
+/// Writes poses and wrenches as MCAP, on the default topics of the command line.
 #[pyfunction]
 pub fn write_recording(
     py: Python<'_>,
@@ -207,14 +206,14 @@ pub fn write_recording(
     })
 }
 
-/// Reads touches as `refine --touches-out` writes them.
+/// Reads touches written by `refine --touches-out`.
 #[pyfunction]
 pub fn read_touches<'py>(py: Python<'py>, path: PathBuf) -> PyResult<Bound<'py, PyDict>> {
     let touches = at_work(py, || Ok(touchup_io::touches_file::read_touches(&path)?))?;
     touches_array(py, &touches)
 }
 
-/// Writes touches as `refine --touches-out` does: Parquet where the name ends so, else CSV.
+/// Writes touches like `refine --touches-out`: Parquet for a name in `.parquet`, else CSV.
 #[pyfunction]
 pub fn write_touches(py: Python<'_>, path: PathBuf, touches: &Bound<'_, PyDict>) -> PyResult<()> {
     let touches = touches_of(touches)?.map_err(|error| exception(py, error))?;

@@ -1,20 +1,20 @@
 //! The native half of the Python package `touchup`: arrays in, arrays out.
 //!
-//! The package around it (`python/touchup`) has the names, types and documentation that users meet;
-//! this half checks shapes, lets go of the interpreter while it works, and turns each error into an
-//! exception with the words of the command line.
+//! The package around it (`python/touchup`) has the names, types and documentation for users; this
+//! half checks shapes, releases the interpreter during work, and turns each error into an exception
+//! with the words of the command line.
 //!
-//! | module | what it does |
+//! | module | content |
 //! |---|---|
 //! | `arrays` | arrays of NumPy as meshes, messages and touches, and back |
 //! | `failure` | errors as exceptions, warnings of the log as warnings |
-//! | `files` | meshes and recordings of files |
+//! | `files` | meshes and recordings in files |
 //! | `refining` | scene and scan in, refined mesh out |
 //! | `refiner` | the same sample by sample |
 //! | `measuring` | features, comparison, alignment |
 //! | `simulating` | scan and touches of a known part |
-//! | `sweeping` | jobs of a sweep, and what moved between two of them |
-//! | `scenes` | what the scene declares |
+//! | `sweeping` | jobs of a sweep, and changes between two of them |
+//! | `scenes` | declared scene keys, and given scenes |
 //! | `command` | the command line |
 #![cfg_attr(not(test), warn(clippy::unwrap_used))]
 
@@ -31,7 +31,7 @@ mod sweeping;
 
 use pyo3::pymodule;
 
-/// Arrays in, arrays out; the package around it has the names that users meet.
+/// Arrays in, arrays out; the package around it has the names for users.
 #[pymodule]
 mod _touchup {
     #[pymodule_export]

@@ -26,9 +26,9 @@ use crate::arrays::{
 use crate::failure::{at_work, exception, usage};
 use crate::scenes::shown;
 
-/// Points of the mesh that are brought onto the truth.
+/// Number of mesh points for one alignment.
 const POINTS: f64 = 100_000.0;
-/// … where that is done for each of many motions.
+/// Number of mesh points for each of many alignments.
 const POINTS_EACH: f64 = 20_000.0;
 
 /// Holes, slots, pockets, bosses, edges, corners and planes of a mesh, as JSON.
@@ -46,7 +46,7 @@ pub fn features(
         .transpose()
         .map_err(|error| exception(py, error))?;
     at_work(py, || {
-        // others keep a corner of each triangle by itself, which makes an edge of every side
+        // other programs give each triangle corners of its own, which makes every side an edge
         let MeshFile { mesh, .. } =
             repaired(&shown(None, "the mesh"), MeshUnit::Metre, vertices, faces)?;
         to_json(&found(&mesh, &touches.unwrap_or_default()).1)
@@ -75,7 +75,7 @@ impl Indexed {
     }
 }
 
-/// How far a mesh is from the true part: `report` as JSON in mm, and `deviation` (V,) of each
+/// Deviation of a mesh from the true part: `report` as JSON in mm, and `deviation` (V,) of each
 /// vertex, m, + outside.
 #[pyfunction]
 #[pyo3(signature = (mesh, support, truth, samples, seed, range_mm, tolerance_mm))]
@@ -163,8 +163,8 @@ fn spread(mesh: &TriMesh, count: f64, seed: u64) -> Vec<OrientedSample> {
         .collect()
 }
 
-/// The rigid motion that brings `source` onto `target`: by point to plane from about the right
-/// place, or by features from anywhere.
+/// The rigid motion of `source` onto `target`: by point to plane from nearly the right pose, or by
+/// features from anywhere.
 #[pyfunction]
 #[pyo3(signature = (source, target, method, alternative, seed))]
 pub fn align<'py>(
@@ -268,7 +268,7 @@ fn homogeneous<'py>(
     py: Python<'py>,
     motion: &Isometry3<f64>,
 ) -> PyResult<Bound<'py, numpy::PyArray2<f64>>> {
-    // rows of the transpose are the columns that are stored
+    // rows of the transpose are the stored columns
     let rows: [[f64; 4]; 4] = motion.to_homogeneous().transpose().into();
     matrix(py, rows.to_vec())
 }

@@ -1,4 +1,4 @@
-//! The refinement sample by sample.
+//! Refinement sample by sample.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -20,13 +20,12 @@ use crate::failure::{at_work, exception, usage};
 use crate::refining::{ScanSource, finish_refinement, refinement};
 use crate::scenes::source;
 
-/// Samples between two looks at whether the user has interrupted; as many as stay in the caches of
-/// a core.
+/// Samples between two checks for an interrupt by the user; they fit the caches of a core.
 const CHUNK: usize = 1024;
-/// The number of a sample that was refused, where the others have that of their case.
+/// Case number of a refused sample.
 const REFUSED: u8 = 255;
 
-/// What one sample did.
+/// Effect of one sample.
 #[pyclass(frozen, module = "touchup")]
 pub struct Update {
     update: touchup_core::haptic::Update,
@@ -45,7 +44,7 @@ impl Update {
         }
     }
 
-    /// The face that was touched; None where there is none within reach.
+    /// The touched face; None without a face within reach.
     #[getter]
     fn face(&self) -> Option<u32> {
         self.update.mismatch.map(|mismatch| mismatch.face.0)
@@ -57,7 +56,7 @@ impl Update {
         self.update.mismatch.map(|mismatch| mismatch.distance)
     }
 
-    /// Force that the scan implies, N, in O.
+    /// Force expected from the scan, N, in O.
     #[getter]
     fn expected_force(&self) -> Option<[f64; 3]> {
         self.vector(|mismatch| mismatch.expected_force_o)
@@ -69,7 +68,7 @@ impl Update {
         self.vector(|mismatch| mismatch.linear)
     }
 
-    /// Whether the mesh was moved.
+    /// Whether the mesh moved.
     #[getter]
     fn moved(&self) -> bool {
         self.update.fit.is_some()
@@ -132,7 +131,7 @@ type SampleArrays<'py> = (
     PyReadonlyArray2<'py, f64>,
 );
 
-/// What became of many samples.
+/// Effects of many samples.
 #[derive(Default)]
 struct Pushed {
     case: Vec<u8>,
@@ -195,10 +194,10 @@ pub struct Refiner {
     state: Mutex<RefinerState>,
 }
 
-/// How far it is.
+/// State of a refiner.
 enum RefinerState {
     Open(Box<Refinement>),
-    /// what had become of the samples
+    /// final counts of the samples
     Finished(RefineCounts),
 }
 
@@ -220,7 +219,7 @@ impl RefinerState {
 }
 
 impl Refiner {
-    /// Another thread may be at work, which needs the interpreter for nothing.
+    /// Locks the state. Another thread may hold it at work, without need of the interpreter.
     fn locked(&self, py: Python<'_>) -> MutexGuard<'_, RefinerState> {
         match self.state.try_lock() {
             Ok(guard) => guard,
@@ -286,7 +285,7 @@ impl<'a> SampleRows<'a> {
         })
     }
 
-    /// The samples of some rows; where one is none, why.
+    /// The samples of some rows; errors for invalid ones.
     fn part(
         &self,
         rows: Range<usize>,
@@ -338,12 +337,12 @@ impl Refiner {
         })
     }
 
-    /// Takes the next sample and moves the mesh by it.
+    /// Takes the next sample and moves the mesh.
     ///
-    /// - `stamp_ns`: ns, after that of the sample before. `position`: (3,) m, centre of the ball in
+    /// - `stamp_ns`: ns, later than the sample before. `position`: (3,) m, centre of the ball in
     ///   the frame of the scan.
     /// - `orientation_xyzw`: (4,) unit quaternion of the tip. `force`: (3,) N. `torque`: (3,) N·m,
-    ///   zeros where it is left out.
+    ///   zeros by default.
     ///
     /// Each may be an array, a tuple or a list. Raises `TouchupError` for a sample that is not
     /// finite, absurd or not in order of time; it changes nothing.
@@ -370,7 +369,7 @@ impl Refiner {
         })
     }
 
-    /// Takes many samples, one after the other; a refused one is counted and changes nothing.
+    /// Takes many samples in order; counts refused ones, which change nothing.
     fn _push_many<'py>(
         &self,
         py: Python<'py>,
@@ -381,7 +380,7 @@ impl Refiner {
         let mut chunk = Vec::with_capacity(CHUNK.min(rows.len()));
         for begin in (0..rows.len()).step_by(CHUNK) {
             py.check_signals()?;
-            // while the interpreter is held, so that no thread of it writes to the arrays
+            // with the interpreter held, so that none of its threads writes to the arrays
             chunk.clear();
             chunk.extend(rows.part(begin..rows.len().min(begin + CHUNK)));
             let (state, pushed, chunk) = (&self.state, &mut pushed, &chunk);
@@ -408,7 +407,7 @@ impl Refiner {
         Ok(into)
     }
 
-    /// A loop of Rust over these samples, for benches to compare with; returns how many were taken.
+    /// Pushes samples in a Rust loop, for comparison in benches; returns the number of accepted ones.
     fn _push_in_rust(&self, py: Python<'_>, samples: SampleArrays<'_>) -> PyResult<usize> {
         let rows = SampleRows::of(&samples).map_err(|error| exception(py, error))?;
         self.in_use(py, |refinement| {
@@ -420,7 +419,7 @@ impl Refiner {
         })
     }
 
-    /// The mesh as the samples so far have moved it.
+    /// The current mesh.
     fn _mesh<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let compact = self.in_use(py, |refinement| Ok(Compact::of(refinement.mesh())))?;
         let into = PyDict::new(py);
@@ -428,12 +427,12 @@ impl Refiner {
         Ok(into)
     }
 
-    /// What became of the samples so far, by name; also once it is finished.
+    /// Counts of all samples, by name; also after the end.
     fn _counts(&self, py: Python<'_>) -> PyResult<String> {
         crate::arrays::json(&self.locked(py).counts()).map_err(|error| exception(py, error))
     }
 
-    /// Reconstructs what was touched; the refiner takes no more samples.
+    /// Reconstructs the touched surface; the refiner then takes no more samples.
     fn _finish<'py>(&self, py: Python<'py>, force: bool) -> PyResult<Bound<'py, PyDict>> {
         let refinement = {
             let mut state = self.locked(py);

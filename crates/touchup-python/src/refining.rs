@@ -23,19 +23,19 @@ use crate::failure::{at_work, exception, usage};
 use crate::files::{recorded_as, set_columns, unit_of};
 use crate::scenes::{SceneSource, shown, source};
 
-/// A scan as it is given.
+/// A scan from the caller.
 pub enum ScanSource {
-    /// … and the unit of its coordinates
+    /// path, and unit of the coordinates
     File(PathBuf, MeshUnit),
     /// m
     Arrays(MeshVecs),
 }
 
 impl ScanSource {
-    /// What is given of a scan.
+    /// The scan from the caller's arguments.
     ///
     /// # Errors
-    /// Where it is both or neither.
+    /// For both or neither.
     pub fn of(
         arrays: Option<MeshArrays<'_>>,
         file: Option<(PathBuf, String)>,
@@ -47,7 +47,7 @@ impl ScanSource {
         }
     }
 
-    /// The mesh, repaired as the command line does it.
+    /// The mesh, repaired as by the command line.
     fn read(self) -> Result<TriMesh, CliError> {
         match self {
             Self::File(path, unit) => Ok(read_scan(&path, unit)?.mesh),
@@ -67,10 +67,10 @@ fn input_of(scan: ScanSource, scene: &SceneSource) -> Result<RefinementInput, Cl
     Ok(RefinementInput::new(scene, scan.read()?)?)
 }
 
-/// A refinement whose samples are pushed.
+/// A refinement to push samples into.
 ///
 /// # Errors
-/// As `touchup refine`.
+/// Those of `touchup refine`.
 pub fn refinement(
     scan: ScanSource,
     scene: &SceneSource,
@@ -84,7 +84,7 @@ pub fn refinement(
 pub struct Reported(RefinedScan);
 
 impl Reported {
-    /// As a dictionary of arrays.
+    /// The result as a dictionary of arrays.
     ///
     /// # Errors
     /// Those of NumPy.
@@ -109,13 +109,13 @@ impl Reported {
     }
 }
 
-/// Where messages come from.
+/// Source of the messages.
 enum Touching {
     File(PathBuf, RecordedAs),
     Messages(Vec<Message>, WrenchFrame),
 }
 
-/// Refines, and judges the recording as `touchup refine` does.
+/// Refines, and checks the recording like `touchup refine`.
 fn refined(
     scan: ScanSource,
     scene: &SceneSource,
@@ -152,10 +152,10 @@ fn refined(
     Ok(warned(refined))
 }
 
-/// Judges and reconstructs what was pushed.
+/// Checks and reconstructs the pushed samples.
 ///
 /// # Errors
-/// As [`refine`].
+/// Those of [`refine`].
 pub fn finish_refinement(mut refinement: Refinement, force: bool) -> Result<Reported, CliError> {
     let (scan, recording) = (shown(None, "the scan"), shown(None, "the samples"));
     refinement.force(force);
@@ -178,7 +178,7 @@ fn warned(refined: RefinedScan) -> Reported {
     Reported(refined)
 }
 
-/// Refines a scan by a recording: of both either arrays or files.
+/// Refines a scan by a recording, each from arrays or a file.
 ///
 /// Returns `vertices` (V, 3) m, `faces` (F, 3), `sigma` (V,) m, `support` (V,), `touches` and
 /// `summary`.

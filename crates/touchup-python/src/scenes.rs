@@ -1,4 +1,4 @@
-//! What the scene declares, and scenes that are given.
+//! Declared keys of the scene, and scenes from the caller.
 
 use std::path::{Path, PathBuf};
 
@@ -11,12 +11,12 @@ use touchup_session::scene::{Scene, SceneError};
 use crate::arrays;
 use crate::failure::{at_work, exception};
 
-/// A scene as it is given: the path of a file, or the text of one.
+/// A scene from the caller: the path of a file, or a text.
 #[derive(Clone, Debug)]
 pub enum SceneSource {
-    /// what would be in a file
+    /// content of a file
     Text(String),
-    /// files that it names are relative to its folder
+    /// path; files that the scene names are relative to its folder
     File(PathBuf),
 }
 
@@ -24,7 +24,7 @@ impl SceneSource {
     /// The scene and its text.
     ///
     /// # Errors
-    /// As the command line.
+    /// Those of the command line.
     pub fn parsed(&self) -> Result<(Scene, String), CliError> {
         match self {
             Self::Text(text) => Ok((Scene::from_yaml(text)?, text.clone())),
@@ -32,10 +32,10 @@ impl SceneSource {
         }
     }
 
-    /// The scene, checked.
+    /// The checked scene.
     ///
     /// # Errors
-    /// As [`Self::parsed`], and where the radius of the ball is not known.
+    /// Those of [`Self::parsed`], and an unknown radius of the ball.
     pub fn read(&self) -> Result<Scene, CliError> {
         let (mut scene, text) = self.parsed()?;
         scene
@@ -56,8 +56,8 @@ impl SceneSource {
     }
 }
 
-/// Every key of the scene as JSON: section, key, unit, range, words, an example of its value, what
-/// it does, and what is in it.
+/// Every key of the scene as JSON: section, key, unit, range, words, an example of its value,
+/// summary, and inner keys.
 #[pyfunction]
 pub fn scene_parameters(py: Python<'_>) -> PyResult<String> {
     let all: Vec<Value> = Scene::parameters().iter().map(declared).collect();
@@ -80,7 +80,7 @@ fn declared(parameter: &Parameter) -> Value {
     })
 }
 
-/// The usual scene as JSON; what is off in it is not there.
+/// The default scene as JSON, without inactive keys.
 #[pyfunction]
 pub fn default_scene(py: Python<'_>) -> PyResult<String> {
     at_work(py, || {
@@ -91,17 +91,17 @@ pub fn default_scene(py: Python<'_>) -> PyResult<String> {
     })
 }
 
-/// Refuses a scene that cannot be.
+/// Refuses an invalid scene.
 #[pyfunction]
 #[pyo3(signature = (text, path))]
 pub fn check_scene(py: Python<'_>, text: Option<String>, path: Option<PathBuf>) -> PyResult<()> {
     at_work(py, || source(text, path)?.read().map(drop))
 }
 
-/// What is given of a scene.
+/// The scene from the caller's arguments.
 ///
 /// # Errors
-/// Where it is both or neither.
+/// For both or neither.
 pub fn source(text: Option<String>, path: Option<PathBuf>) -> Result<SceneSource, CliError> {
     match (text, path) {
         (Some(text), None) => Ok(SceneSource::Text(text)),
@@ -112,7 +112,7 @@ pub fn source(text: Option<String>, path: Option<PathBuf>) -> Result<SceneSource
     }
 }
 
-/// A path that is named in messages, or what stands for one.
+/// A path for messages, or its placeholder.
 pub fn shown(path: Option<&Path>, otherwise: &str) -> PathBuf {
     path.map_or_else(|| PathBuf::from(otherwise), Path::to_path_buf)
 }

@@ -9,10 +9,10 @@ use touchup_sim::SimWorld;
 use crate::arrays::{Compact, MeshArrays, mesh_of, messages_into};
 use crate::failure::{at_work, exception, usage};
 
-/// Scans and touches a part as `touchup simulate` does.
+/// Scans and touches a part like `touchup simulate`.
 ///
 /// Returns `scan` with its `vertices` (V, 3) m and `faces` (F, 3), the arrays of `recording`, and
-/// `scene`, a text, where there is a world.
+/// `scene`, a text, if there is a world.
 #[pyfunction]
 #[pyo3(signature = (truth, seed, world, told_off, tip_radius_mm, stiffness_n_per_mm, friction, scan_edge_mm, scan_noise_mm, scanner, sides))]
 #[expect(clippy::too_many_arguments, reason = "what the package passes on")]

@@ -1,4 +1,4 @@
-//! Jobs of a sweep, and what moved between two of them.
+//! Jobs of a sweep, and changes between two of them.
 
 use std::path::{Path, PathBuf};
 
@@ -16,7 +16,7 @@ use crate::arrays::{Compact, json as to_json};
 use crate::failure::at_work;
 use crate::files::set_columns;
 
-/// Writes the jobs of a sweep, and returns how many there are.
+/// Writes the jobs of a sweep, and returns their number.
 #[pyfunction]
 pub fn sweep_plan(
     py: Python<'_>,
@@ -27,10 +27,9 @@ pub fn sweep_plan(
     at_work(py, || plan_sweep(&grid, &recordings, &out))
 }
 
-/// Runs one job as `touchup sweep run --job` does; one that has its result returns at once.
+/// Runs one job like `touchup sweep run --job`; returns at once if its result exists.
 ///
-/// - `scan`, `recording`: content of their files, where the caller has it already: then they are
-///   not read.
+/// - `scan`, `recording`: content of their files, if the caller holds it, in place of reading them.
 ///
 /// Returns `job`, `id`, `result` (its folder), `was_there`, `failed` (why, or None) and `summary`,
 /// a text of JSON.
@@ -72,8 +71,8 @@ pub fn run_job<'py>(
     Ok(into)
 }
 
-/// What came of all jobs, as JSON: a row for each job, one for each feature, the number of
-/// those without a result, and in words those whose result is damaged.
+/// Results of all jobs as JSON: a row for each job, one for each feature, the number of jobs
+/// without a result, and damaged results in words.
 #[pyfunction]
 #[pyo3(signature = (jobs, results, with_features))]
 pub fn sweep_tables(
@@ -97,8 +96,8 @@ pub fn sweep_tables(
     })
 }
 
-/// What moved between the results in two folders: `report` as JSON, and of each mesh its arrays
-/// with `displacement` and `plus_minus` (V,) m.
+/// Changes between the results in two folders: `report` as JSON, and for each mesh its arrays with
+/// `displacement` and `plus_minus` (V,) m.
 #[pyfunction]
 pub fn what_if<'py>(py: Python<'py>, a: PathBuf, b: PathBuf) -> PyResult<Bound<'py, PyDict>> {
     let (results, found, report) = at_work(py, || {
