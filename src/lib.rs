@@ -32,7 +32,6 @@ pub use touchup_session::{
 pub use {touchup_io as io, touchup_sim as sim};
 
 pub mod cli;
-mod html;
 mod inspection;
 pub mod log_lines;
 #[cfg(any(feature = "ros", feature = "r2r"))]

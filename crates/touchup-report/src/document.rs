@@ -2,8 +2,9 @@
 
 use serde::Serialize;
 
-use super::figure::{Chapter, Drawing, Figure, Table};
-use super::plot::Looks;
+use touchup_page::figure::Figure;
+
+use super::table::{Chapter, Table};
 
 /// Provenance of the measurements.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -34,16 +35,6 @@ impl Report {
         self.advice
             .iter()
             .chain(self.chapters.iter().flat_map(|chapter| &chapter.tables))
-    }
-
-    /// One look for each series, the same in all figures.
-    pub(super) fn looks(&self) -> Looks {
-        Looks::of(self.figures().filter_map(|figure| match &figure.drawing {
-            Drawing::Curves(series) => {
-                Some(series.iter().map(|series| series.name.as_str()).collect())
-            }
-            Drawing::Maps { .. } => None,
-        }))
     }
 
     /// What every picture says about where it is from.

@@ -3,7 +3,8 @@
 use std::collections::BTreeSet;
 
 use super::document::Report;
-use super::{csv, page, plot};
+use super::{csv, page};
+use touchup_page::{ChartSize, Looks, printable};
 
 /// Why a report cannot be written down.
 #[derive(Debug, thiserror::Error)]
@@ -36,7 +37,7 @@ impl Report {
     pub fn files(&self) -> Result<Vec<OutputFile>, ReportError> {
         self.check_names()?;
         let provenance = self.provenance();
-        let looks = self.looks();
+        let looks = Looks::of(self.figures());
         let mut files = Vec::new();
         let mut add = |id: &str, ending: &str, text: String| {
             files.push(OutputFile {
@@ -47,7 +48,8 @@ impl Report {
         add("report", "html", page::html(self));
         add("report", "json", serde_json::to_string_pretty(self)? + "\n");
         for figure in self.figures() {
-            add(&figure.id, "svg", plot::svg(figure, &looks, &provenance));
+            let picture = figure.svg(&looks, ChartSize::PAGE, &provenance);
+            add(&figure.id, "svg", printable(&picture) + "\n");
             add(&figure.id, "csv", csv::of_figure(figure));
         }
         for table in self.tables() {

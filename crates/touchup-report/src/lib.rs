@@ -14,22 +14,20 @@ pub mod document;
 mod double_double;
 pub mod error;
 pub mod extremes;
-mod figure;
 pub mod files;
 pub mod mistakes;
-mod number;
 mod page;
 pub mod peers;
-mod plot;
 pub mod reference;
 pub mod stability;
+mod table;
 pub mod verdict;
 pub mod whole_scan;
 pub mod work_precision;
 
-pub use figure::{
-    Axis, Chapter, Drawing, Figure, LineStroke, Mark, Panel, Scale, Series, Spread, Table,
-    TableCell, TableOf,
+pub use table::{Chapter, Table, TableCell, TableOf};
+pub use touchup_page::figure::{
+    Axis, Drawing, Figure, LineStroke, Mark, Panel, Scale, Series, Spread,
 };
 
 /// How much is measured.

@@ -5,12 +5,12 @@ use super::convergence::{Convergence, Rule};
 use super::cost::{Cost, RecordingCost};
 use super::coverage::Coverage;
 use super::extremes::Extremes;
-use super::figure::{Table, TableCell};
 use super::mistakes::{LEAST_NAMED, Mistakes};
-use super::number::three_digits;
 use super::peers::{Peers, PeersAtSize};
 use super::stability::{Integrator, Stability};
 use super::whole_scan::{CaseResult, MethodResult, RefineMethod, ScanResult, WholeScan};
+use crate::{Table, TableCell};
+use touchup_page::number::three_digits;
 
 /// Method and region, step, rate and limits, each with its reason and its cost; `None` where no
 /// method made any scan better.

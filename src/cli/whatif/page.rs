@@ -2,9 +2,12 @@
 
 use std::io;
 
+use maud::{Markup, html};
+use touchup_page::number::{fixed, signed};
+use touchup_page::{document, picture_address, table};
+
 use super::report::{MovedVertices, WhatIfReport};
 use crate::compare::{Displacement, PartView, PicturePanel, PictureParams, Rgb, draw_part};
-use crate::html::{base64, escaped, table};
 use crate::io::png::png_bytes;
 use crate::mesh::TriMesh;
 use crate::sweep::{COVERAGE as K, FeatureChange, JobResult, NumberChange, WhatIf};
@@ -48,28 +51,25 @@ pub(super) fn page(
     [a, b]: [&JobResult; 2],
     found: &WhatIf,
 ) -> io::Result<String> {
-    let mut pictures = figure("A", &a.mesh, &found.of_a, &report.vertices_a, report)?;
-    if let (Some(of_b), Some(vertices)) = (&found.of_b, &report.vertices_b) {
-        pictures += &figure("B", &b.mesh, of_b, vertices, report)?;
-    }
     let title = title(report);
-    let body = [
-        format!("<h1>{}</h1>\n", escaped(&title)),
-        verdict(report),
-        keys(report),
-        format!(
-            "<h2>Where the surface moved</h2>\n{}<div class=\"pictures\">\n{pictures}</div>\n",
-            legend()
-        ),
-        features(report),
-        how(report),
-    ];
-    Ok(format!(
-        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width\">\n\
-         <title>{}</title>\n<style>\n{CSS}</style>\n</head>\n<body>\n<main>\n{}</main>\n</body>\n</html>\n",
-        escaped(&title),
-        body.concat()
-    ))
+    let body = html! {
+        main {
+            h1 { (title) }
+            (verdict(report))
+            (keys(report))
+            h2 { "Where the surface moved" }
+            (legend())
+            div.pictures {
+                (figure("A", &a.mesh, &found.of_a, &report.vertices_a, report)?)
+                @if let (Some(of_b), Some(vertices)) = (&found.of_b, &report.vertices_b) {
+                    (figure("B", &b.mesh, of_b, vertices, report)?)
+                }
+            }
+            (features(report))
+            (how(report))
+        }
+    };
+    Ok(document(&title, CSS, &body))
 }
 
 fn shown(value: &serde_json::Value) -> String {
@@ -80,7 +80,7 @@ fn shown(value: &serde_json::Value) -> String {
     }
 }
 
-/// A question where one key differs.
+/// A question about the one key that differs.
 fn title(report: &WhatIfReport) -> String {
     let mut keys = report.keys.iter();
     match (keys.next(), keys.next()) {
@@ -92,110 +92,76 @@ fn title(report: &WhatIfReport) -> String {
     }
 }
 
-fn verdict(report: &WhatIfReport) -> String {
-    let shown = report.vertices_b.as_ref().unwrap_or(&report.vertices_a);
-    let share = 100.0 * shown.moved as f64 / shown.vertices.max(1) as f64;
-    let farthest = shown
-        .farthest_mm
-        .map_or("no vertex moves".to_owned(), |mm| {
-            format!("the farthest moves by {} mm", signed(mm))
-        });
-    let alone = report
-        .features
-        .iter()
-        .filter(|one| one.id_a.is_none() || one.id_b.is_none())
-        .count();
-    let tile =
-        |number: String, what: String| format!("<div><b>{number}</b><span>{what}</span></div>\n");
-    let tiles = [
-        tile(
-            format!("{:.1} %", share),
-            format!(
-                "of the vertices move by more than their ±: {} of {}",
-                shown.moved, shown.vertices
-            ),
-        ),
-        tile(
-            shown
-                .farthest_mm
-                .map_or("–".to_owned(), |mm| format!("{} mm", signed(mm))),
-            shown.farthest_plus_minus_mm.map_or(farthest, |known| {
-                format!("is the largest displacement, known to ± {known:.3} mm")
-            }),
-        ),
-        tile(
-            format!(
-                "{} of {}",
-                report.features_moved - alone,
-                report.features.len()
-            ),
-            "features have a number that moves by more than its ±".to_owned(),
-        ),
-        tile(
-            alone.to_string(),
-            "features are found in one result alone".to_owned(),
-        ),
-    ];
-    format!("<div class=\"tiles\">\n{}</div>\n", tiles.concat())
-}
-
-/// With the sign of mathematics.
-fn signed(mm: f64) -> String {
-    format!("{mm:+.3}").replace('-', "−")
-}
-
-fn plain(number: f64) -> String {
-    format!("{number:.3}").replace('-', "−")
-}
-
-fn keys(report: &WhatIfReport) -> String {
-    if report.keys.is_empty() {
-        return "<p>Scan, recording, scene and version are the same in both.</p>\n".to_owned();
+fn verdict(report: &WhatIfReport) -> Markup {
+    let vertices = report.vertices_b.as_ref().unwrap_or(&report.vertices_a);
+    let MovedVertices {
+        vertices: all,
+        moved,
+        farthest_mm,
+        farthest_plus_minus_mm,
+        ..
+    } = *vertices;
+    let farthest = farthest_mm.map(|mm| format!("{} mm", signed(mm, 3)));
+    let largest = match (&farthest, farthest_plus_minus_mm) {
+        (_, Some(known)) => format!("is the largest displacement, known to ± {known:.3} mm"),
+        (Some(farthest), None) => format!("the farthest moves by {farthest}"),
+        (None, None) => "no vertex moves".to_owned(),
+    };
+    let is_alone = |one: &&FeatureChange| one.id_a.is_none() || one.id_b.is_none();
+    let alone = report.features.iter().filter(is_alone).count();
+    let (both, features) = (report.features_moved - alone, report.features.len());
+    html! {
+        div.tiles {
+            div {
+                b { (format!("{:.1} %", 100.0 * moved as f64 / all.max(1) as f64)) }
+                span { "of the vertices move by more than their ±: " (moved) " of " (all) }
+            }
+            div { b { (farthest.as_deref().unwrap_or("–")) } span { (largest) } }
+            div {
+                b { (both) " of " (features) }
+                span { "features have a number that moves by more than its ±" }
+            }
+            div { b { (alone) } span { "features are found in one result alone" } }
+        }
     }
-    let row = |(key, [a, b]): (&String, &[serde_json::Value; 2])| {
-        vec![
-            format!("<code>{}</code>", escaped(key)),
-            escaped(&shown(a)),
-            escaped(&shown(b)),
+}
+
+fn keys(report: &WhatIfReport) -> Markup {
+    let heads = [("Input", ""), ("A", &*report.a), ("B", &report.b)];
+    let heads = heads.map(|(head, name)| html! { (head) " " span.small { (name) } });
+    let rows = report.keys.iter();
+    let rows = rows.map(|(key, [a, b])| {
+        [
+            html! { code { (key) } },
+            html! { (shown(a)) },
+            html! { (shown(b)) },
         ]
-    };
-    let rows: Vec<_> = report.keys.iter().map(row).collect();
-    let of =
-        |name: &str, which: &str| format!("{which} <span class=\"small\">{}</span>", escaped(name));
-    let head = ["Input".to_owned(), of(&report.a, "A"), of(&report.b, "B")];
-    let head: Vec<&str> = head.iter().map(String::as_str).collect();
-    format!("<h2>What differs</h2>\n{}", table("keys", &head, &rows))
+    });
+    html! {
+        @if report.keys.is_empty() {
+            p { "Scan, recording, scene and version are the same in both." }
+        } @else {
+            h2 { "What differs" }
+            (table("keys", heads, rows))
+        }
+    }
 }
 
-fn css(colour: Rgb) -> String {
-    let [r, g, b] = colour;
-    format!("#{r:02x}{g:02x}{b:02x}")
-}
-
-fn legend() -> String {
+fn legend() -> Markup {
     let ends = ["1 to 2 ±", "2 to 4 ±", "over 4 ±"];
-    let chip = |colour: Rgb, text: &str| {
-        format!(
-            "<span><i style=\"background:{}\"></i>{text}</span>",
-            css(colour)
-        )
-    };
-    let inwards = STEPS
-        .iter()
-        .zip(ends)
-        .rev()
-        .map(|((_, colour, _), text)| chip(*colour, text));
-    let outwards = STEPS
-        .iter()
-        .zip(ends)
-        .map(|((.., colour), text)| chip(*colour, text));
-    let all: String = inwards
-        .chain([chip(STILL, "within ±")])
-        .chain(outwards)
-        .collect();
-    format!(
-        "<p class=\"legend\"><em>← inwards, less material</em>{all}<em>outwards, more material →</em></p>\n"
-    )
+    let steps = || STEPS.into_iter().zip(ends);
+    let inwards = steps().rev().map(|((_, colour, _), text)| (colour, text));
+    let outwards = steps().map(|((.., colour), text)| (colour, text));
+    let css = |[r, g, b]: Rgb| format!("background:#{r:02x}{g:02x}{b:02x}");
+    html! {
+        p.legend {
+            em { "← inwards, less material" }
+            @for (colour, text) in inwards.chain([(STILL, "within ±")]).chain(outwards) {
+                span { i style=(css(colour)) {} (text) }
+            }
+            em { "outwards, more material →" }
+        }
+    }
 }
 
 fn figure(
@@ -204,149 +170,130 @@ fn figure(
     displaced: &[Displacement],
     vertices: &MovedVertices,
     report: &WhatIfReport,
-) -> io::Result<String> {
+) -> io::Result<Markup> {
+    let MovedVertices {
+        vertices, moved, ..
+    } = vertices;
     let paint: Vec<Rgb> = displaced.iter().map(colour_at).collect();
-    let weights: Vec<f64> = displaced
+    let weights = displaced
         .iter()
-        .map(|one| if one.is_moved(K) { 1.0 } else { 0.0 })
-        .collect();
+        .map(|one| f64::from(u8::from(one.is_moved(K))));
+    let weights: Vec<f64> = weights.collect();
+    let params = PictureParams {
+        width: WIDTH,
+        weights: (*moved > 0).then_some(&*weights),
+        ..PictureParams::default()
+    };
     let panel = PicturePanel {
         paint: Some(&paint),
         ..PicturePanel::of(mesh)
     };
-    let weights = (vertices.moved > 0).then_some(&*weights);
-    let params = PictureParams {
-        width: WIDTH,
-        weights,
-        ..PictureParams::default()
-    };
     let PartView { picture, .. } = draw_part(&panel, &params, &[]);
-    let png = base64(&png_bytes(picture.size, &picture.pixels)?);
+    let png = png_bytes(picture.size, &picture.pixels)?;
     let [width, height] = picture.size;
-    let MovedVertices {
-        vertices, moved, ..
-    } = vertices;
     let (which, against) = match (&report.vertices_b, name) {
-        (None, _) => ("Both have the same vertices; this is A".to_owned(), "B"),
-        (Some(_), "A") => ("The mesh of A".to_owned(), "B"),
-        (Some(_), _) => ("The mesh of B".to_owned(), "A"),
+        (None, _) => ("Both have the same vertices; this is A", "B"),
+        (Some(_), "A") => ("The mesh of A", "B"),
+        (Some(_), _) => ("The mesh of B", "A"),
     };
-    Ok(format!(
-        "<figure><img src=\"data:image/png;base64,{png}\" width=\"{width}\" height=\"{height}\" alt=\"mesh {name} in the colours of what moved\">\
-         <figcaption><strong>{name}.</strong> {which}: {moved} of {vertices} vertices lie off the surface of {against} by more than ±.</figcaption></figure>\n"
-    ))
+    Ok(html! {
+        figure {
+            img src=(picture_address(&png)) width=(width) height=(height)
+                alt={ "mesh " (name) " in the colours of what moved" };
+            figcaption {
+                strong { (name) "." } " " (which) ": " (moved) " of " (vertices) " vertices lie off the surface of "
+                (against) " by more than ±."
+            }
+        }
+    })
 }
 
-fn features(report: &WhatIfReport) -> String {
+fn features(report: &WhatIfReport) -> Markup {
     let (moved, still): (Vec<_>, Vec<_>) = report.features.iter().partition(|one| one.is_moved());
-    let head = [
-        "Feature",
-        "Where, mm",
-        "Number",
-        "A",
-        "B",
-        "Change",
-        "±",
-        "",
-    ];
-    let shown = |features: &[&FeatureChange]| {
-        let rows: Vec<_> = features.iter().flat_map(|feature| rows(feature)).collect();
-        format!(
-            "<div class=\"scroll\">{}</div>\n",
-            table("features", &head, &rows)
-        )
+    let of = |features: &[&FeatureChange]| {
+        let heads = [
+            "Feature",
+            "Where, mm",
+            "Number",
+            "A",
+            "B",
+            "Change",
+            "±",
+            "",
+        ];
+        let rows = features.iter().flat_map(|feature| rows(feature));
+        html! { div.scroll { (table("features", heads, rows)) } }
     };
-    let first = match moved.len() {
-        0 => "<p>No number of a feature moves by more than its ±, and both results find the same features.</p>\n"
-            .to_owned(),
-        _ => shown(&moved),
-    };
-    let rest = match still.len() {
-        0 => String::new(),
-        count => {
-            format!(
-                "<details><summary>{count} features that do not move</summary>\n{}</details>\n",
-                shown(&still)
-            )
+    html! {
+        h2 { "Features" }
+        @if moved.is_empty() {
+            p { "No number of a feature moves by more than its ±, and both results find the same features." }
+        } @else {
+            (of(&moved))
+        }
+        @if !still.is_empty() {
+            details { summary { (still.len()) " features that do not move" } (of(&still)) }
+        }
+    }
+}
+
+fn rows(feature: &FeatureChange) -> Vec<[Markup; 8]> {
+    let id = feature.id_a.or(feature.id_b).unwrap_or_default();
+    let place = feature
+        .center_mm
+        .map(|place| place.map(|mm| format!("{mm:.1}").replace('-', "−")));
+    let place = place.map_or("–".to_owned(), |place| place.join(", "));
+    let begin = |is_first: bool| {
+        let [name, place] = [
+            html! { strong { (feature.kind) " " (id) } },
+            html! { (place) },
+        ];
+        if is_first {
+            [name, place]
+        } else {
+            Default::default()
         }
     };
-    format!("<h2>Features</h2>\n{first}{rest}")
-}
-
-#[expect(clippy::too_many_lines)]
-fn rows(feature: &FeatureChange) -> Vec<Vec<String>> {
-    let id = feature.id_a.or(feature.id_b).unwrap_or_default();
-    let name = format!("<strong>{} {id}</strong>", escaped(&feature.kind));
-    let place = feature.center_mm.map_or("–".to_owned(), |place| {
-        place
-            .map(|mm| format!("{mm:.1}").replace('-', "−"))
-            .join(", ")
-    });
+    let chip = |text: &str| html! { span.chip { (text) } };
     let alone = match (feature.id_a, feature.id_b) {
         (Some(_), None) => Some("found in A alone"),
         (None, Some(_)) => Some("found in B alone"),
         _ => None,
     };
     if let Some(alone) = alone {
-        let none = || String::new();
-        return vec![vec![
-            name,
-            place,
-            none(),
-            none(),
-            none(),
-            none(),
-            none(),
-            chip(alone),
-        ]];
+        let [name, place] = begin(true);
+        let [a, b, c, d, e] = <[Markup; 5]>::default();
+        return vec![[name, place, a, b, c, d, e, chip(alone)]];
     }
     let row = |(at, number): (usize, &NumberChange)| {
-        let NumberChange {
-            name: of,
-            a,
-            b,
-            change,
-            plus_minus,
-            moved,
-        } = number;
-        let (what, unit) = in_words(of);
-        let value = |value: &Option<f64>| value.map_or("–".to_owned(), plain);
-        let cells = vec![
-            if at == 0 { name.clone() } else { String::new() },
-            if at == 0 {
-                place.clone()
-            } else {
-                String::new()
-            },
-            what,
-            value(a),
-            value(b),
-            format!(
-                "{} {unit}",
-                if a.is_some() {
-                    signed(*change)
-                } else {
-                    plain(*change)
-                }
-            ),
-            plus_minus.map_or("not known".to_owned(), plain),
-            if *moved { chip("moves") } else { String::new() },
-        ];
-        // the feature keeps its name and place
-        let soft = |(at, cell): (usize, String)| {
-            if *moved || at < 2 {
-                cell
-            } else {
-                format!("<span class=\"still\">{cell}</span>")
-            }
+        let (what, unit) = in_words(&number.name);
+        let value = |value: Option<f64>, none| value.map_or(none, |value| fixed(value, 3));
+        let change = match number.a {
+            Some(_) => signed(number.change, 3),
+            None => fixed(number.change, 3),
         };
-        cells.into_iter().enumerate().map(soft).collect()
+        let none = || "–".to_owned();
+        let soft = |text: String| match number.moved {
+            true => html! { (text) },
+            false => html! { span.still { (text) } },
+        };
+        let [name, place] = begin(at == 0);
+        [
+            name,
+            place,
+            soft(what),
+            soft(value(number.a, none())),
+            soft(value(number.b, none())),
+            soft(format!("{change} {unit}")),
+            soft(value(number.plus_minus, "not known".to_owned())),
+            if number.moved {
+                chip("moves")
+            } else {
+                Markup::default()
+            },
+        ]
     };
     feature.numbers.iter().enumerate().map(row).collect()
-}
-
-fn chip(text: &str) -> String {
-    format!("<span class=\"chip\">{text}</span>")
 }
 
 /// A number without its unit, and its unit.
@@ -356,33 +303,31 @@ fn in_words(name: &str) -> (String, &'static str) {
         Some((what, "deg")) => (what, "°"),
         _ => (name, ""),
     };
-    (
-        if what == "center" {
-            "place".to_owned()
-        } else {
-            what.replace('_', " ")
-        },
-        unit,
-    )
+    let what = if what == "center" { "place" } else { what };
+    (what.replace('_', " "), unit)
 }
 
-fn how(report: &WhatIfReport) -> String {
-    let of_sigma = if report.vertices_a.is_sigma_known {
-        "± is the larger of both results there, at k = 2 standard deviations"
-    } else {
-        "neither scene has uncertainty: no ± is known, and every vertex that lies elsewhere counts as moved"
-    };
-    let of_vertices = if report.vertices_b.is_some() {
-        "The results have different vertices. So each vertex of A is compared with the nearest place of the surface of B, and each of B \
-         with that of A."
-    } else {
-        "Both results have the same vertices and faces: each vertex is compared with itself, along its normal in A."
-    };
-    format!(
-        "<h2>How this is measured</h2>\n<p class=\"small\">{of_vertices} A place moves where it lies farther off than ±; {of_sigma}. A \
-         feature is the same in both where its kind is, its axis within 30° and its place within 1.5 mm. The place of a hole, slot, pocket \
-         or boss is compared across its axis, that of a plane along its normal.</p>\n"
-    )
+fn how(report: &WhatIfReport) -> Markup {
+    html! {
+        h2 { "How this is measured" }
+        p.small {
+            @if report.vertices_b.is_some() {
+                "The results have different vertices. So each vertex of A is compared with the nearest place of the \
+                surface of B, and each of B with that of A."
+            } @else {
+                "Both results have the same vertices and faces: each vertex is compared with itself, along its normal \
+                in A."
+            }
+            " A place moves where it lies farther off than ±; "
+            @if report.vertices_a.is_sigma_known {
+                "± is the larger of both results there, at k = 2 standard deviations"
+            } @else {
+                "neither scene has uncertainty: no ± is known, and every vertex that lies elsewhere counts as moved"
+            }
+            ". A feature is the same in both where its kind is, its axis within 30° and its place within 1.5 mm. The \
+            place of a hole, slot, pocket or boss is compared across its axis, that of a plane along its normal."
+        }
+    }
 }
 
 const CSS: &str = "\

@@ -1,11 +1,11 @@
-//! What a report is made of.
+//! Input of a report.
 
 use crate::inspection::calibration::CalibrationLine;
 use crate::inspection::params::PartPicture;
 use crate::inspection::rows::Inspected;
 use crate::inspection::source::InspectionSource;
 
-/// … all that was read and decided.
+/// Files and decisions.
 pub(in crate::inspection) struct ReportInput<'a> {
     pub inspected: &'a Inspected,
     pub source: &'a InspectionSource,

@@ -1,16 +1,19 @@
 //! The part with a numbered balloon at each feature.
 
 use std::f64::consts::{PI, TAU};
-use std::fmt::Write;
+use std::path::Path;
 
+use maud::{Markup, html};
 use nalgebra::Point3;
+use touchup_page::picture_address;
 
 use super::decisions::{DecisionLook, look_of};
 use super::input::ReportInput;
 use crate::compare::{PartView, PicturePanel, PictureParams, Rgb, draw_part};
 use crate::conformity::Decision;
-use crate::html::base64;
 use crate::inspection::InspectionError;
+use crate::inspection::params::PartPicture;
+use crate::inspection::rows::Balloon;
 use crate::io::file_error::FileError;
 use crate::io::mesh_file::read_vertex_columns;
 use crate::io::png::png_bytes;
@@ -25,131 +28,114 @@ const RADIUS: f64 = 21.0;
 const TOUCHED: Rgb = [150, 184, 214];
 const SCANNED: Rgb = [205, 208, 213];
 
-/// The section; says so where there is no mesh.
-#[expect(clippy::too_many_lines)]
-pub(super) fn picture(input: &ReportInput<'_>) -> Result<String, InspectionError> {
+/// The section; says so without a mesh.
+pub(super) fn picture(input: &ReportInput<'_>) -> Result<Markup, InspectionError> {
     let Some(path) = &input.source.mesh else {
-        return Ok(
-            "<h2>Picture</h2>\n<p class=\"small\">No mesh was given (--mesh): there is no picture.</p>\n".to_owned()
-        );
-    };
-    let Scan { mesh, .. } = read_scan(path, input.picture.mesh_unit)?;
-    let [touched] = read_vertex_columns(path, input.picture.mesh_unit, &mesh, ["touched"])?;
-    let is_touched = |vertex: usize| {
-        touched
-            .as_ref()
-            .and_then(|column| column.get(vertex))
-            .is_some_and(|share| *share >= 1.0)
-    };
-    let slots = mesh.vertex_slots();
-    let paint: Vec<Rgb> = (0..slots)
-        .map(|vertex| if is_touched(vertex) { TOUCHED } else { SCANNED })
-        .collect();
-    let weights: Option<Vec<f64>> = touched
-        .as_ref()
-        .filter(|column| column.iter().any(|share| *share >= 1.0))
-        .map(|_| {
-            (0..slots)
-                .map(|vertex| f64::from(u8::from(is_touched(vertex))))
-                .collect()
+        return Ok(html! {
+            h2 { "Picture" }
+            p.small { "No mesh was given (--mesh): there is no picture." }
         });
-    let placed: Vec<_> = input
-        .inspected
-        .balloons
-        .iter()
-        .filter(|balloon| balloon.place_mm.is_some())
-        .collect();
-    let places: Vec<_> = placed
-        .iter()
-        .filter_map(|balloon| balloon.place_mm)
-        .map(|mm| Point3::from(mm) * 1e-3)
-        .collect();
-    let panel = PicturePanel {
-        paint: Some(&paint),
-        ..PicturePanel::of(&mesh)
     };
-    let params = PictureParams {
-        width: WIDTH,
-        from: input.picture.view,
-        weights: weights.as_deref(),
-        ..PictureParams::default()
-    };
-    let PartView { picture, places } = draw_part(&panel, &params, &places);
+    let placed = input.inspected.balloons.iter();
+    let placed =
+        placed.filter_map(|balloon| Some((balloon, Point3::from(balloon.place_mm?) * 1e-3)));
+    let (balloons, places): (Vec<_>, Vec<_>) = placed.unzip();
+    let PartView { picture, places } = part_view(path, input.picture, &places)?;
     let png = png_bytes(picture.size, &picture.pixels).map_err(|source| FileError::Write {
         path: path.clone(),
         source,
     })?;
     let [width, height] = picture.size.map(f64::from);
-    let mut svg = format!(
-        "<svg class=\"part\" viewBox=\"0 0 {} {}\" role=\"img\" aria-label=\"the part with numbered features\"><rect width=\"100%\" height=\"100%\" fill=\"#e9ecf0\"/><image x=\"{MARGIN}\" y=\"{MARGIN}\" width=\"{width}\" height=\"{height}\" href=\"data:image/png;base64,{}\"/>",
-        width + 2.0 * MARGIN,
-        height + 2.0 * MARGIN,
-        base64(&png)
-    );
     let is_inside = |[x, y]: &[f64; 2]| (0.0..=width).contains(x) && (0.0..=height).contains(y);
-    let (placed, places): (Vec<_>, Vec<_>) = placed
+    let drawn = balloons
         .into_iter()
         .zip(places)
-        .filter(|(_, place)| is_inside(place))
-        .unzip();
+        .filter(|(_, place)| is_inside(place));
+    let (balloons, places): (Vec<_>, Vec<_>) = drawn.unzip();
+    let unseen = input.inspected.balloons.len() - balloons.len();
     let seats = balloon_seats(&places, [width, height]);
-    for ((balloon, place), seat) in placed.iter().zip(&places).zip(&seats) {
-        let decisions = balloon
-            .characteristics
-            .iter()
-            .map(|&at| &*input.inspected.record.characteristics[at].decision);
-        let worst = decisions
-            .max_by_key(|name| {
-                Decision::ALL
-                    .iter()
-                    .position(|decision| decision.name() == *name)
-            })
-            .unwrap_or("undecided");
-        draw_balloon(
-            &mut svg,
-            balloon.number,
-            worst,
-            balloon.feature.is_some(),
-            place.map(|x| x + MARGIN),
-            *seat,
-        );
-    }
-    svg += "</svg>";
-    let unseen = input.inspected.balloons.len() - placed.len();
-    let unseen = if unseen == 0 {
-        String::new()
-    } else {
-        format!(" {unseen} without a place on the mesh are not drawn.")
-    };
-    let caption = format!(
-        "Blue was touched, grey is the scan. A balloon has the colour and sign of the worst decision of its feature; dashed: not found, at its nominal place.{unseen}"
-    );
-    Ok(format!(
-        "<figure>{svg}<figcaption>{caption}</figcaption></figure>\n"
-    ))
+    let balloons = balloons
+        .iter()
+        .zip(&places)
+        .zip(&seats)
+        .map(|((one, place), seat)| {
+            draw_balloon(one, worst(input, one), place.map(|x| x + MARGIN), *seat)
+        });
+    Ok(html! {
+        figure {
+            svg.part viewBox={ "0 0 " (width + 2.0 * MARGIN) " " (height + 2.0 * MARGIN) } role="img"
+                aria-label="the part with numbered features" {
+                rect width="100%" height="100%" fill="#e9ecf0" {}
+                image x=(MARGIN) y=(MARGIN) width=(width) height=(height) href=(picture_address(&png)) {}
+                @for balloon in balloons { (balloon) }
+            }
+            figcaption {
+                "Blue was touched, grey is the scan. A balloon has the colour and sign of the worst decision of its \
+                feature; dashed: not found, at its nominal place."
+                @if unseen > 0 { " " (unseen) " without a place on the mesh are not drawn." }
+            }
+        }
+    })
 }
 
-fn draw_balloon(
-    svg: &mut String,
-    number: usize,
-    decision: &str,
-    is_found: bool,
-    [x, y]: [f64; 2],
-    [u, v]: [f64; 2],
-) {
-    let DecisionLook { fill, ink, sign } = look_of(decision);
-    let dash = if is_found {
-        ""
-    } else {
-        " stroke-dasharray=\"6 4\""
+/// The part in the colours of touch and scan, with places on it.
+fn part_view(
+    path: &Path,
+    PartPicture { mesh_unit, view }: PartPicture,
+    places: &[Point3<f64>],
+) -> Result<PartView, InspectionError> {
+    let Scan { mesh, .. } = read_scan(path, mesh_unit)?;
+    let [touched] = read_vertex_columns(path, mesh_unit, &mesh, ["touched"])?;
+    let touched = touched.unwrap_or_default();
+    let is_touched = |vertex| touched.get(vertex).is_some_and(|share| *share >= 1.0);
+    let vertices = 0..mesh.vertex_slots();
+    let paint = vertices
+        .clone()
+        .map(|vertex| if is_touched(vertex) { TOUCHED } else { SCANNED });
+    let paint: Vec<Rgb> = paint.collect();
+    let weights: Vec<f64> = vertices
+        .map(|vertex| f64::from(u8::from(is_touched(vertex))))
+        .collect();
+    let params = PictureParams {
+        width: WIDTH,
+        from: view,
+        weights: weights.contains(&1.0).then_some(&*weights),
+        ..PictureParams::default()
     };
-    let _ = write!(
-        svg,
-        "<path d=\"M{x:.1} {y:.1} L{u:.1} {v:.1}\" stroke=\"#1d2129\" stroke-width=\"2\"{dash}/><circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"5\" fill=\"#1d2129\" stroke=\"#fff\" stroke-width=\"2\"/>\
-         <circle cx=\"{u:.1}\" cy=\"{v:.1}\" r=\"{RADIUS}\" fill=\"{fill}\" stroke=\"#1d2129\" stroke-width=\"2\"{dash}/>\
-         <text x=\"{u:.1}\" y=\"{:.1}\" font-size=\"21\" font-weight=\"700\" text-anchor=\"middle\" fill=\"{ink}\">{number}{sign}</text>",
-        v + 7.0
-    );
+    let panel = PicturePanel {
+        paint: Some(&paint),
+        ..PicturePanel::of(&mesh)
+    };
+    Ok(draw_part(&panel, &params, places))
+}
+
+/// The worst decision of a feature.
+fn worst<'a>(input: &ReportInput<'a>, balloon: &Balloon) -> &'a str {
+    let rank = |name: &&str| {
+        Decision::ALL
+            .iter()
+            .position(|decision| decision.name() == *name)
+    };
+    let characteristics = &input.inspected.record.characteristics;
+    let decisions = balloon
+        .characteristics
+        .iter()
+        .map(|&at| &*characteristics[at].decision);
+    decisions.max_by_key(rank).unwrap_or("undecided")
+}
+
+fn draw_balloon(balloon: &Balloon, decision: &str, place: [f64; 2], seat: [f64; 2]) -> Markup {
+    let DecisionLook { fill, ink, sign } = look_of(decision);
+    let dash = balloon.feature.is_none().then_some("6 4");
+    let [[x, y], [u, v]] = [place, seat].map(|at| at.map(|x| format!("{x:.1}")));
+    html! {
+        path d={ "M" (x) " " (y) " L" (u) " " (v) } stroke="#1d2129" stroke-width="2" stroke-dasharray=[dash] {}
+        circle cx=(x) cy=(y) r="5" fill="#1d2129" stroke="#fff" stroke-width="2" {}
+        circle cx=(u) cy=(v) r=(RADIUS) fill=(fill) stroke="#1d2129" stroke-width="2" stroke-dasharray=[dash] {}
+        text x=(u) y=(format!("{:.1}", seat[1] + 7.0)) font-size="21" font-weight="700" text-anchor="middle" fill=(ink) {
+            (balloon.number) (sign)
+        }
+    }
 }
 
 /// Points of the outline on which balloons stand.

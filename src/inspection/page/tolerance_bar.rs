@@ -1,95 +1,65 @@
 //! A characteristic drawn: tolerance zone, acceptance zone, measured value with its expanded
 //! uncertainty.
 
-use std::fmt::Write;
+use maud::{Markup, html};
 
 use crate::features::InspectedQuantity;
 use crate::io::inspection_file::CharacteristicRecord;
 
 /// Pixels.
-const SIZE: [f64; 2] = [150.0, 22.0];
+const WIDTH: f64 = 150.0;
+const DARK: &str = "#1d2129";
 
 /// The drawing as SVG; nothing without a limit.
-#[expect(clippy::too_many_lines)]
-pub(super) fn tolerance_bar(one: &CharacteristicRecord) -> String {
+pub(super) fn tolerance_bar(one: &CharacteristicRecord) -> Markup {
     let number = |name: &str| one.number(name);
-    let (lower, upper) = (number("lower_limit"), number("upper_limit"));
-    let actual = number("actual");
+    let (lower, upper, actual) = (
+        number("lower_limit"),
+        number("upper_limit"),
+        number("actual"),
+    );
     let spread = number("expanded_uncertainty").unwrap_or(0.0);
     // of a single limit the zone is drawn as wide as the value is away from it
     let reach = actual.zip(lower.or(upper)).map_or(1.0, |(y, limit)| {
         (y - limit).abs().max(2.0 * spread).max(1e-6) * 1.6
     });
-    let (low, high) = match (lower, upper) {
-        (Some(lower), Some(upper)) => (lower, upper),
-        (Some(lower), None) => (lower, lower + reach),
-        (None, Some(upper)) => (upper - reach, upper),
-        (None, None) => return String::new(),
+    let is_zone = InspectedQuantity::of_name(&one.quantity).is_some_and(InspectedQuantity::is_zone);
+    let low = match (lower, upper) {
+        (None, None) => return Markup::default(),
+        _ if is_zone => 0.0,
+        (Some(lower), _) => lower,
+        (None, Some(upper)) => upper - reach,
     };
-    let low = if InspectedQuantity::of_name(&one.quantity).is_some_and(InspectedQuantity::is_zone) {
-        0.0
-    } else {
-        low
-    };
+    let high = upper
+        .or(lower.map(|lower| lower + reach))
+        .unwrap_or(low + reach);
     let margin = (high - low) * 0.35;
-    let [width, height] = SIZE;
     let x = |value: f64| {
-        ((value - low + margin) / (high - low + 2.0 * margin) * width).clamp(2.0, width - 2.0)
+        ((value - low + margin) / (high - low + 2.0 * margin) * WIDTH).clamp(2.0, WIDTH - 2.0)
     };
-    let mut svg = format!(
-        "<svg viewBox=\"0 0 {width} {height}\" width=\"{width}\" height=\"{height}\" role=\"img\" aria-label=\"value in its tolerance\">"
-    );
-    let mut rect = |from: f64, to: f64, top: f64, tall: f64, fill: &str| {
-        let _ = write!(
-            svg,
-            "<rect x=\"{:.1}\" y=\"{top}\" width=\"{:.1}\" height=\"{tall}\" fill=\"{fill}\"/>",
-            from,
-            (to - from).max(0.0)
-        );
+    let rect = |from: f64, to: f64, [top, tall]: [f64; 2], fill: &str| {
+        let [from, width] = [from, (to - from).max(0.0)].map(|x| format!("{x:.1}"));
+        html! { rect x=(from) y=(top) width=(width) height=(tall) fill=(fill) {} }
     };
-    rect(2.0, width - 2.0, 10.0, 2.0, "#c9ced8");
-    rect(x(low), x(high), 6.0, 10.0, "#d8dde6");
-    let accepted = (number("acceptance_lower"), number("acceptance_upper"));
-    if accepted != (None, None) {
-        rect(
-            x(accepted.0.unwrap_or(low)),
-            x(accepted.1.unwrap_or(high)),
-            6.0,
-            10.0,
-            "#7fb9ac",
-        );
+    let accepted = [number("acceptance_lower"), number("acceptance_upper")];
+    html! {
+        svg viewBox={ "0 0 " (WIDTH) " 22" } width=(WIDTH) height="22" role="img" aria-label="value in its tolerance" {
+            (rect(2.0, WIDTH - 2.0, [10.0, 2.0], "#c9ced8"))
+            (rect(x(low), x(high), [6.0, 10.0], "#d8dde6"))
+            @if accepted != [None; 2] {
+                (rect(x(accepted[0].unwrap_or(low)), x(accepted[1].unwrap_or(high)), [6.0, 10.0], "#7fb9ac"))
+            }
+            @for limit in [lower, upper].into_iter().flatten() {
+                (rect(x(limit) - 0.75, x(limit) + 0.75, [2.0, 18.0], DARK))
+            }
+            @if let Some(y) = actual {
+                (rect(x(y - spread), if one.is_at_least { WIDTH - 2.0 } else { x(y + spread) }, [10.25, 1.5], DARK))
+                @if (low - margin..=high + margin).contains(&y) {
+                    circle cx=(format!("{:.1}", x(y))) cy="11" r="3.2" fill=(DARK) {}
+                } @else {
+                    path d=(if y > high { "M148 11 l-7 -5 v10 z" } else { "M2 11 l7 -5 v10 z" }) fill="#b94a00" {}
+                }
+            }
+        }
     }
-    for limit in [lower, upper].into_iter().flatten() {
-        rect(x(limit) - 0.75, x(limit) + 0.75, 2.0, 18.0, "#1d2129");
-    }
-    if let Some(y) = actual {
-        let (from, to) = (
-            x(y - spread),
-            if one.is_at_least {
-                width - 2.0
-            } else {
-                x(y + spread)
-            },
-        );
-        rect(from, to, 10.25, 1.5, "#1d2129");
-        let inside = (low - margin..=high + margin).contains(&y);
-        let _ = if inside {
-            write!(
-                svg,
-                "<circle cx=\"{:.1}\" cy=\"11\" r=\"3.2\" fill=\"#1d2129\"/>",
-                x(y)
-            )
-        } else {
-            let (at, turn) = if y > high {
-                (width - 2.0, -7.0)
-            } else {
-                (2.0, 7.0)
-            };
-            write!(
-                svg,
-                "<path d=\"M{at} 11 l{turn} -5 v10 z\" fill=\"#b94a00\"/>"
-            )
-        };
-    }
-    svg + "</svg>"
 }

@@ -1,48 +1,45 @@
 //! The touches behind each number.
 
+use maud::{Markup, html};
+use touchup_core::numeric::counted;
+use touchup_page::table;
+
 use super::decisions::in_words;
 use super::input::ReportInput;
 use super::plots::{force_plot, residual_plot};
-use crate::html::{escaped, table};
 use crate::inspection::evidence::{TouchEvidence, probed_behind, touch_evidence, widest_gap_deg};
 use crate::inspection::rows::Balloon;
 use crate::io::features_file::FeatureRecord;
-use touchup_core::numeric::counted;
 
-/// The section; nothing without touches.
-pub(super) fn touches(input: &ReportInput<'_>) -> String {
-    if input.source.touches.is_empty() {
-        let why = "<p>No file of touches was given (--touches): what is behind the numbers is not shown.</p>\n";
-        return format!("<h2>Touches behind the numbers</h2>\n{why}");
+/// The section; says so without touches.
+pub(super) fn touches(input: &ReportInput<'_>) -> Markup {
+    let balloons = || input.inspected.balloons.iter();
+    let missing = balloons().filter(|balloon| balloon.feature.is_none());
+    let missing = missing.map(|balloon| format!("{} · {}", balloon.number, balloon.kind));
+    let missing: Vec<_> = missing.collect();
+    html! {
+        h2 { "Touches behind the numbers" }
+        @if input.source.touches.is_empty() {
+            p { "No file of touches was given (--touches): what is behind the numbers is not shown." }
+        } @else {
+            p.small {
+                "Blue band: ± 2 standard deviations of a single touch as the measurement states them. Of many touches \
+                evenly chosen ones are drawn; the numbers are of all."
+            }
+            @if !missing.is_empty() {
+                p.small { "Not found, so without touches: " (missing.join(", ")) "." }
+            }
+            @for balloon in balloons() { (feature(input, balloon)) }
+        }
     }
-    let balloons = input.inspected.balloons.iter();
-    let parts: String = balloons
-        .clone()
-        .map(|balloon| feature(input, balloon))
-        .collect();
-    let missing = balloons.filter(|balloon| balloon.feature.is_none());
-    let missing: Vec<_> = missing
-        .map(|balloon| format!("{} · {}", balloon.number, escaped(&balloon.kind)))
-        .collect();
-    let missing = match missing.len() {
-        0 => String::new(),
-        _ => format!(
-            "<p class=\"small\">Not found, so without touches: {}.</p>\n",
-            missing.join(", ")
-        ),
-    };
-    let note = "<p class=\"small\">Blue band: ± 2 standard deviations of a single touch as the measurement states them. Of many touches evenly chosen ones are drawn; the numbers are of all.</p>\n";
-    format!("<h2>Touches behind the numbers</h2>\n{note}{missing}{parts}")
 }
 
-#[expect(clippy::too_many_lines)]
-fn feature(input: &ReportInput<'_>, balloon: &Balloon) -> String {
+fn feature(input: &ReportInput<'_>, balloon: &Balloon) -> Markup {
     let features = &input.source.features;
     let Some(found) = balloon.feature.and_then(|id| features.feature(id)) else {
-        return String::new();
+        return Markup::default();
     };
-    let mut rows = Vec::new();
-    let mut figures = String::new();
+    let (mut rows, mut figures) = (Vec::new(), Vec::new());
     let mut drawn: Vec<(&[[u32; 2]], bool)> = Vec::new();
     for &at in &balloon.characteristics {
         let (one, runs) = (
@@ -50,33 +47,27 @@ fn feature(input: &ReportInput<'_>, balloon: &Balloon) -> String {
             &input.inspected.runs[at],
         );
         let quantity = input.inspected.quantities[at];
-        let evidence = if quantity.needs_datum() {
-            None
-        } else {
-            touch_evidence(quantity, found, runs, &input.source.touches)
-        };
-        let micrometres = |mm: f64| format!("{:.1}", mm * 1e3);
-        let of = |number: fn(&TouchEvidence) -> f64| {
-            evidence
+        let evidence = (!quantity.needs_datum())
+            .then(|| touch_evidence(quantity, found, runs, &input.source.touches))
+            .flatten();
+        let micrometres = |number: fn(&TouchEvidence) -> f64| {
+            let number = evidence
                 .as_ref()
-                .map_or("–".to_owned(), |found| micrometres(number(found)))
+                .map(|found| format!("{:.1}", number(found) * 1e3));
+            html! { (number.unwrap_or("–".to_owned())) }
         };
-        rows.push(vec![
-            escaped(&one.number),
-            format!(
-                "{} <span class=\"small\">{}</span>",
-                escaped(&one.name),
-                in_words(&one.quantity)
-            ),
-            one.touches.to_string(),
-            of(|found| found.rms_mm),
-            of(|found| found.largest_mm),
-            of(|found| found.stated_mm),
+        rows.push([
+            html! { (one.number) },
+            html! { (one.name) " " span.small { (in_words(&one.quantity)) } },
+            html! { (one.touches) },
+            micrometres(|found| found.rms_mm),
+            micrometres(|found| found.largest_mm),
+            micrometres(|found| found.stated_mm),
         ]);
         let is_depth = one.quantity == "depth_mm";
         if let Some(evidence) = evidence.filter(|_| !drawn.contains(&(runs, is_depth))) {
             drawn.push((runs, is_depth));
-            figures += &residual_figure(&evidence, &one.number);
+            figures.push(residual_figure(&evidence, &one.number));
         }
         let probed = probed_behind(&input.source.probed, runs, &input.source.touches);
         if let Some(plot) = force_plot(&probed)
@@ -84,10 +75,10 @@ fn feature(input: &ReportInput<'_>, balloon: &Balloon) -> String {
         {
             let rejected = probed.iter().filter(|touch| !touch.accepted).count();
             let count = counted(probed.len(), "touch", "touches");
-            figures += &format!(
-                "<figure>{plot}<figcaption>{}: force of {count} of the arm, {rejected} of them rejected</figcaption></figure>\n",
-                escaped(&one.number)
-            );
+            figures.push(html! {
+                (plot)
+                figcaption { (one.number) ": force of " (count) " of the arm, " (rejected) " of them rejected" }
+            });
         }
     }
     let head = [
@@ -98,14 +89,16 @@ fn feature(input: &ReportInput<'_>, balloon: &Balloon) -> String {
         "largest, µm",
         "stated, µm",
     ];
-    format!(
-        "<section class=\"feature\"><h3>{} · {} <span class=\"small\">id {}, {}</span></h3>\n{}<div class=\"plots\">{figures}</div></section>\n",
-        balloon.number,
-        escaped(&balloon.kind),
-        found.id,
-        fitted(found),
-        table("", &head, &rows)
-    )
+    html! {
+        section.feature {
+            h3 {
+                (balloon.number) " · " (balloon.kind) " "
+                span.small { "id " (found.id) ", " (fitted(found)) }
+            }
+            (table("", head, rows))
+            div.plots { @for figure in figures { figure { (figure) } } }
+        }
+    }
 }
 
 fn fitted(feature: &FeatureRecord) -> String {
@@ -115,19 +108,16 @@ fn fitted(feature: &FeatureRecord) -> String {
     }
 }
 
-fn residual_figure(evidence: &TouchEvidence, number: &str) -> String {
-    let gap = if evidence.along.contains('°') {
-        format!(
-            "; widest gap {:.0}° of the turn",
-            widest_gap_deg(&evidence.drawn)
-        )
-    } else {
-        String::new()
-    };
-    let count = counted(evidence.count, "touch", "touches");
-    let caption = format!("{}: {count} off {}{gap}", escaped(number), evidence.ideal);
-    format!(
-        "<figure>{}<figcaption>{caption}</figcaption></figure>\n",
-        residual_plot(evidence)
-    )
+fn residual_figure(evidence: &TouchEvidence, number: &str) -> Markup {
+    let gap = evidence
+        .along
+        .contains('°')
+        .then(|| widest_gap_deg(&evidence.drawn));
+    html! {
+        (residual_plot(evidence))
+        figcaption {
+            (number) ": " (counted(evidence.count, "touch", "touches")) " off " (evidence.ideal)
+            @if let Some(gap) = gap { "; widest gap " (format!("{gap:.0}")) "° of the turn" }
+        }
+    }
 }

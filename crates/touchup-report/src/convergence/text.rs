@@ -1,8 +1,8 @@
 //! Convergence as a chapter of the report.
 
 use super::{Convergence, Decay, MeshErrors, OneFaceRun, OneFaceSample, Rule, SweepRun};
-use crate::number::range;
 use crate::{Axis, Chapter, Drawing, Figure, LineStroke, Mark, Series, Table};
+use touchup_page::number::range;
 
 /// Errors of one face below it are roundings.
 const DRAWN_FROM: f64 = 1e-12;

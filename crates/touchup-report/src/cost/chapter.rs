@@ -4,8 +4,8 @@ use super::{
     Cost, LARGEST_RATIO, LAW_UP_TO, LEAST_REPLAY_PER_S, PartCost, READING, RecordingCost,
     ReplaySpeed, SizeCost,
 };
-use crate::number::three_digits;
 use crate::{Axis, Chapter, Drawing, Figure, LineStroke, Mark, Series, Spread, Table};
+use touchup_page::number::three_digits;
 use touchup_sim::wavy::RADIUS;
 
 /// A time within this of the law is no more than the law.

@@ -1,8 +1,8 @@
 //! Coverage as a chapter of the report.
 
 use super::{Coverage, CoverageKind, HONEST, KindInWorld, SIGMAS_95};
-use crate::number::three_digits;
 use crate::{Axis, Chapter, Drawing, Figure, LineStroke, Mark, Series, Table, TableCell};
+use touchup_page::number::three_digits;
 use touchup_sim::SimWorld;
 
 /// Marks of a cumulative curve, and where it ends.

@@ -1,8 +1,8 @@
 //! Figures and tables of whole scans.
 
 use super::{CaseResult, MethodResult, RefineMethod, ScanResult, TouchedError, WholeScan};
-use crate::number::range;
 use crate::{Axis, Drawing, Figure, LineStroke, Mark, Series, Spread, Table};
+use touchup_page::number::range;
 
 /// Points of a drawn law.
 const STEPS: usize = 12;

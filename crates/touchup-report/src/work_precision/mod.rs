@@ -12,8 +12,8 @@ use std::hint::black_box;
 pub use method::{Method, Solved, SolverSetting};
 pub use problem::Problem;
 
-use super::number::three_digits;
 use super::{Effort, Spread, timed};
+use touchup_page::number::three_digits;
 
 /// The paper's h_min, m.
 pub const PAPER_H_MIN_M: f64 = 0.5e-3;

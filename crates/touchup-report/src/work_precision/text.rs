@@ -1,8 +1,8 @@
 //! The results as a chapter, with its text.
 
 use super::{Curve, FaceCase, IntegratorRun, Method, PAPER_H_MIN_M, TILTS_DEG, WorkPrecision};
-use crate::number::{range, three_digits};
 use crate::{Axis, Chapter, Drawing, Figure, LineStroke, Mark, Series, Spread, Table};
+use touchup_page::number::{range, three_digits};
 
 /// Requested accuracy, m: the resolution of a sensor, a thousandth of that, and as good as exact.
 const LEVELS_M: [(f64, &str); 3] = [(1e-6, "1 µm"), (1e-9, "1 nm"), (1e-12, "1 pm")];

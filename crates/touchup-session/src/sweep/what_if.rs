@@ -302,17 +302,6 @@ fn change(a: Option<&FeatureRecord>, b: Option<&FeatureRecord>, k: f64) -> Featu
     }
 }
 
-/// A number of a feature.
-type NumberOf = fn(&FeatureRecord) -> Option<f64>;
-
-const NUMBERS: [(&str, NumberOf); 5] = [
-    ("diameter_mm", |one| one.diameter_mm),
-    ("length_mm", |one| one.length_mm),
-    ("width_mm", |one| one.width_mm),
-    ("depth_mm", |one| one.depth_mm),
-    ("cone_angle_deg", |one| one.cone_angle_deg),
-];
-
 fn numbers(a: &FeatureRecord, b: &FeatureRecord, k: f64) -> Vec<NumberChange> {
     let changed = |name: &'static str, values: [Option<f64>; 2], change: f64| {
         let stds = [a, b].map(|one| one.std.get(name).copied());

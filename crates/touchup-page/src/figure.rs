@@ -1,5 +1,4 @@
-//! What a report shows: figures and tables, as data. How they look is the matter of [`super::plot`]
-//! and [`super::page`].
+//! Figures as data.
 
 use serde::{Deserialize, Serialize};
 
@@ -22,25 +21,38 @@ pub struct Axis {
     pub column: String,
     /// how it is divided
     pub scale: Scale,
+    /// its ends; `None`: around the marks
+    #[serde(skip)]
+    pub ends: Option<[f64; 2]>,
 }
 
 impl Axis {
+    fn of(label: &str, column: &str, scale: Scale) -> Self {
+        let [label, column] = [label, column].map(str::to_owned);
+        let ends = None;
+        Self {
+            label,
+            column,
+            scale,
+            ends,
+        }
+    }
+
     /// An axis of equal differences.
     pub fn linear(label: &str, column: &str) -> Self {
-        Self {
-            label: label.to_owned(),
-            column: column.to_owned(),
-            scale: Scale::Linear,
-        }
+        Self::of(label, column, Scale::Linear)
     }
 
     /// An axis of equal ratios.
     pub fn log(label: &str, column: &str) -> Self {
-        Self {
-            label: label.to_owned(),
-            column: column.to_owned(),
-            scale: Scale::Log,
-        }
+        Self::of(label, column, Scale::Log)
+    }
+
+    /// From one value to another, with numbers at both and in the middle.
+    #[must_use]
+    pub fn within(self, ends: [f64; 2]) -> Self {
+        let ends = Some(ends);
+        Self { ends, ..self }
     }
 }
 
@@ -129,6 +141,10 @@ pub enum LineStroke {
     Course,
     /// a thin dashed line without marks: a model, a limit
     Dashed,
+    /// dots alone: a cloud of many values
+    Dots,
+    /// a field from the 10th to the 90th percentile upward
+    Band,
 }
 
 /// Marks that belong together.
@@ -205,13 +221,12 @@ pub struct Figure {
 impl Figure {
     /// Begins one with what is drawn.
     pub fn of(id: impl Into<String>, drawing: Drawing) -> Self {
-        let [x, y] = [Axis::linear("", ""), Axis::linear("", "")];
         Self {
             id: id.into(),
             title: String::new(),
             caption: String::new(),
-            x,
-            y,
+            x: Axis::linear("", ""),
+            y: Axis::linear("", ""),
             drawing,
         }
     }
@@ -237,134 +252,6 @@ impl Figure {
         Self {
             caption: caption.into(),
             ..self
-        }
-    }
-}
-
-/// One cell of a table.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-#[serde(untagged)]
-pub enum TableCell {
-    /// words
-    Text(String),
-    /// a number in the unit of its column, shown with three digits
-    Number(f64),
-    /// the median is shown, with its spread
-    Spread(Spread),
-    /// nothing to say
-    Empty,
-}
-
-/// What a cell is made of.
-macro_rules! cells_of {
-    ($($value:ty => $cell:expr,)*) => {$(
-        impl From<$value> for TableCell {
-            fn from(value: $value) -> Self {
-                $cell(value)
-            }
-        }
-    )*};
-}
-
-cells_of! {
-    &str => |text: &str| Self::Text(text.to_owned()),
-    String => Self::Text,
-    f64 => Self::Number,
-    usize => |count| Self::Number(count as f64),
-    Spread => Self::Spread,
-}
-
-impl<T: Into<TableCell>> From<Option<T>> for TableCell {
-    fn from(value: Option<T>) -> Self {
-        value.map_or(Self::Empty, T::into)
-    }
-}
-
-/// A table with heads that carry their units.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Table {
-    /// file name of its CSV, without ending
-    pub id: String,
-    /// above it
-    pub title: String,
-    /// below it
-    pub caption: String,
-    /// one a column, with the unit: "push, µs"
-    pub heads: Vec<String>,
-    /// one a line, each as long as `heads`
-    pub rows: Vec<Vec<TableCell>>,
-}
-
-impl Table {
-    /// Begins a table of these rows; its columns come one by one, its caption last.
-    pub fn of<R: Copy>(id: &str, title: &str, rows: impl IntoIterator<Item = R>) -> TableOf<R> {
-        let [id, title] = [id, title].map(str::to_owned);
-        let rows: Vec<R> = rows.into_iter().collect();
-        let cells = vec![Vec::new(); rows.len()];
-        TableOf {
-            rows,
-            table: Self {
-                id,
-                title,
-                caption: String::new(),
-                heads: Vec::new(),
-                rows: cells,
-            },
-        }
-    }
-}
-
-/// A table that grows column by column.
-pub struct TableOf<R> {
-    rows: Vec<R>,
-    table: Table,
-}
-
-impl<R: Copy> TableOf<R> {
-    /// Adds a column: its head with the unit, and what it shows of each row.
-    #[must_use]
-    pub fn column<C: Into<TableCell>>(
-        mut self,
-        head: impl Into<String>,
-        cell: impl Fn(R) -> C,
-    ) -> Self {
-        self.table.heads.push(head.into());
-        for (cells, row) in self.table.rows.iter_mut().zip(&self.rows) {
-            cells.push(cell(*row).into());
-        }
-        self
-    }
-
-    /// The table, with what is below it.
-    pub fn caption(self, caption: impl Into<String>) -> Table {
-        Table {
-            caption: caption.into(),
-            ..self.table
-        }
-    }
-}
-
-/// One part of the report.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Chapter {
-    /// its number and name
-    pub title: String,
-    /// what was done and what it says, a paragraph each, in plain words
-    pub text: Vec<String>,
-    /// pictures, in order
-    pub figures: Vec<Figure>,
-    /// tables, in order
-    pub tables: Vec<Table>,
-}
-
-impl Chapter {
-    /// Of its parts, in order.
-    pub fn of(title: &str, text: Vec<String>, figures: Vec<Figure>, tables: Vec<Table>) -> Self {
-        Self {
-            title: title.to_owned(),
-            text,
-            figures,
-            tables,
         }
     }
 }

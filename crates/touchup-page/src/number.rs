@@ -35,6 +35,21 @@ pub fn power_of_ten(exponent: i32) -> String {
     format!("10{sign}{}", raised.collect::<String>())
 }
 
+/// A number with this many digits behind the point, and the sign of mathematics; none before a 0.
+pub fn fixed(value: f64, digits: usize) -> String {
+    let text = format!("{value:.digits$}");
+    if text.trim_matches(['-', '0', '.']).is_empty() {
+        text.trim_start_matches('-').to_owned()
+    } else {
+        text.replace('-', "−")
+    }
+}
+
+/// The same with a sign before any number.
+pub fn signed(value: f64, digits: usize) -> String {
+    format!("{value:+.digits$}").replace('-', "−")
+}
+
 /// The smallest and the largest; `None` where there are none.
 pub fn range(values: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
     values

@@ -1,0 +1,202 @@
+//! Curves and marks in one frame, with a legend beside or below it.
+
+use maud::{Markup, html};
+
+use super::extent::Extent;
+use super::frame::Frame;
+use super::looks::Looks;
+use super::{ChartSize, label, points, px, text_width, upward_label};
+use crate::figure::{Figure, LineStroke, Mark, Series};
+
+/// A legend is beside the frame if its names are no wider.
+const WIDEST_BESIDE: f64 = 230.0;
+/// The sample of line and mark in front of a name.
+const SAMPLE: f64 = 34.0;
+/// From line to line of the legend.
+const LINE: f64 = 21.0;
+
+/// Where the parts of a figure are.
+struct Layout {
+    frame: Frame,
+    /// middle of the first sample line of the legend
+    legend: [f64; 2],
+    /// of the legend
+    columns: usize,
+    /// lower edge
+    bottom: f64,
+}
+
+impl Layout {
+    fn of(series: &[Series], y: &Extent, size: ChartSize) -> Self {
+        let widths = |texts: &[&str], letters| {
+            let widths = texts.iter().map(|text| text_width(text, letters));
+            widths.fold(0.0, f64::max)
+        };
+        let height = size.height;
+        if !size.is_labelled {
+            let ticks = y.ticks();
+            let numbers: Vec<_> = ticks.iter().map(|tick| tick.label.as_str()).collect();
+            let left = widths(&numbers, 12.0) + 28.0;
+            let (top, width) = (8.0, size.width - left - 14.0);
+            return Self {
+                frame: Frame {
+                    left,
+                    top,
+                    width,
+                    height,
+                },
+                legend: [0.0; 2],
+                columns: 1,
+                bottom: top + height + 42.0,
+            };
+        }
+        let names: Vec<_> = series.iter().map(|one| one.name.as_str()).collect();
+        let name = widths(&names, 12.5) + SAMPLE;
+        let (left, top) = (82.0, 38.0);
+        let is_beside = name <= WIDEST_BESIDE + SAMPLE && series.len() as f64 * LINE <= height;
+        let width = size.width - left - 24.0 - if is_beside { name } else { 0.0 };
+        let frame = Frame {
+            left,
+            top,
+            width,
+            height,
+        };
+        let below = frame.bottom() + 50.0;
+        if is_beside {
+            let legend = [frame.right() + 14.0, top + 12.0];
+            return Self {
+                frame,
+                legend,
+                columns: 1,
+                bottom: below,
+            };
+        }
+        let columns = (((size.width - left) / (name + 20.0)) as usize).max(1);
+        let bottom = below + series.len().div_ceil(columns) as f64 * LINE;
+        Self {
+            frame,
+            legend: [left, below + 12.0],
+            columns,
+            bottom,
+        }
+    }
+}
+
+/// The drawing, and its lower edge.
+pub(super) fn draw(
+    figure: &Figure,
+    series: &[Series],
+    looks: &Looks,
+    size: ChartSize,
+) -> (Markup, f64) {
+    let marks = || series.iter().flat_map(|series| &series.marks);
+    let x = Extent::around(&figure.x, marks().flat_map(|mark| mark.x.numbers()));
+    let y = Extent::around(&figure.y, marks().flat_map(|mark| mark.y.numbers()));
+    let Layout {
+        frame,
+        legend: corner,
+        columns,
+        bottom,
+    } = Layout::of(series, &y, size);
+    let (name_left, name_below) = if size.is_labelled {
+        (56.0, 38.0)
+    } else {
+        (frame.left - 13.0, 36.0)
+    };
+    let [middle, centre] = frame.place([0.5, 0.5]);
+    let hidden = marks()
+        .filter(|mark| place(&frame, [&x, &y], mark).is_none())
+        .count();
+    let is_band = |one: &&Series| one.stroke == LineStroke::Band;
+    let drawing = html! {
+        @for one in series.iter().filter(is_band) { (band(&frame, [&x, &y], one)) }
+        (frame.grid(&x, &y))
+        (label([middle, frame.bottom() + name_below], "middle", 13.0, &figure.x.label))
+        (upward_label([frame.left - name_left, centre], &figure.y.label))
+        @for one in series { (draw_series(&frame, [&x, &y], looks, one)) }
+        (frame.border())
+        @if size.is_labelled { (legend(series, looks, corner, (size.width - frame.left, columns))) }
+        @if hidden > 0 {
+            text x=(px(frame.left)) y=(px(bottom + 14.0)) font-size="11.5" fill="#a33" {
+                (hidden) " marks are not shown: they have no place on these axes (0, or not finite)"
+            }
+        }
+    };
+    (drawing, if hidden > 0 { bottom + 18.0 } else { bottom })
+}
+
+fn place(frame: &Frame, [x, y]: [&Extent; 2], mark: &Mark) -> Option<[f64; 2]> {
+    Some(frame.place([x.place(mark.x.median)?, y.place(mark.y.median)?]))
+}
+
+fn draw_series(frame: &Frame, extents: [&Extent; 2], looks: &Looks, series: &Series) -> Markup {
+    let look = looks.look(&series.name);
+    let places = series.marks.iter().map(|mark| place(frame, extents, mark));
+    let places: Vec<Option<[f64; 2]>> = places.collect();
+    // a mark without a place parts the line
+    let stretches = places
+        .split(Option::is_none)
+        .filter(|stretch| stretch.len() > 1);
+    let has_bars = matches!(series.stroke, LineStroke::Joined | LineStroke::Marks);
+    html! {
+        @for stretch in stretches {
+            (look.line(series.stroke, &points(stretch.iter().flatten().copied())))
+        }
+        @for (mark, place) in series.marks.iter().zip(&places) {
+            @if let Some(place) = place {
+                @for bar in bars(frame, extents, mark, *place).iter().filter(|_| has_bars) {
+                    path d=(bar) fill="none" stroke=(look.colour()) stroke-opacity="0.7" {}
+                }
+                (look.mark(series.stroke, *place))
+            }
+        }
+    }
+}
+
+/// From the 10th to the 90th percentile of both values, if they are apart: a line with a short
+/// stroke across each end.
+fn bars(frame: &Frame, [x, y]: [&Extent; 2], mark: &Mark, [left, top]: [f64; 2]) -> Vec<String> {
+    let ends = |extent: &Extent, axis: usize, [_, p10, p90]: [f64; 3]| {
+        let ends = [extent.place(p10)?, extent.place(p90)?].map(|end| frame.place([end; 2])[axis]);
+        ((ends[0] - ends[1]).abs() >= 1.0).then(|| ends.map(px))
+    };
+    let level = ends(x, 0, mark.x.numbers()).map(|[from, to]| {
+        let (y, above) = (px(top), px(top - 3.0));
+        format!("M{from} {y}H{to}M{from} {above}v6M{to} {above}v6")
+    });
+    let upward = ends(y, 1, mark.y.numbers()).map(|[from, to]| {
+        let (x, before) = (px(left), px(left - 3.0));
+        format!("M{x} {from}V{to}M{before} {from}h6M{before} {to}h6")
+    });
+    level.into_iter().chain(upward).collect()
+}
+
+fn band(frame: &Frame, [x, y]: [&Extent; 2], series: &Series) -> Markup {
+    let edge = |upward: fn(&Mark) -> f64| {
+        let at =
+            move |mark: &Mark| Some(frame.place([x.place(mark.x.median)?, y.place(upward(mark))?]));
+        series.marks.iter().filter_map(at)
+    };
+    let lower: Vec<_> = edge(|mark| mark.y.p10).collect();
+    let outline = edge(|mark| mark.y.p90).chain(lower.into_iter().rev());
+    html! { polygon points=(points(outline)) fill="#e4ecf5" {} }
+}
+
+fn legend(
+    series: &[Series],
+    looks: &Looks,
+    [left, top]: [f64; 2],
+    (width, columns): (f64, usize),
+) -> Markup {
+    let lines = series.iter().enumerate().map(|(at, series)| {
+        let x = left + (at % columns) as f64 * width / columns as f64;
+        (x, top + (at / columns) as f64 * LINE, series)
+    });
+    html! {
+        @for (x, y, series) in lines {
+            (looks.look(&series.name).line(series.stroke, &points([[x, y], [x + SAMPLE - 8.0, y]])))
+            (looks.look(&series.name).mark(series.stroke, [x + 0.5 * (SAMPLE - 8.0), y]))
+            (label([x + SAMPLE, y + 4.5], "start", 12.5, &series.name))
+        }
+    }
+}

@@ -1,0 +1,123 @@
+//! Figures as SVG, on white. Its own drawing: the libraries for charts in Rust have no legend
+//! beside the frame and no text that shows when a cell is pointed at.
+
+mod curves;
+mod extent;
+mod frame;
+mod looks;
+mod maps;
+
+use maud::{Markup, html};
+
+pub use looks::Looks;
+
+use crate::figure::{Drawing, Figure};
+
+/// Size of the letters of the provenance.
+const SMALL: f64 = 10.5;
+
+/// The room that a chart has, in units of which a number on an axis is 12 high.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ChartSize {
+    /// of the whole picture
+    pub width: f64,
+    /// of the frame
+    pub height: f64,
+    /// whether title and legend are drawn
+    pub is_labelled: bool,
+}
+
+impl ChartSize {
+    /// Over the width of a page.
+    pub const PAGE: Self = Self {
+        width: 900.0,
+        height: 400.0,
+        is_labelled: true,
+    };
+    /// A third of that, for one of several beside each other.
+    pub const SMALL: Self = Self {
+        width: 480.0,
+        height: 132.0,
+        is_labelled: false,
+    };
+}
+
+impl Figure {
+    /// The figure as a picture of its own.
+    ///
+    /// - `looks`: of its series.
+    /// - `provenance`: in small letters below it.
+    pub fn svg(&self, looks: &Looks, size: ChartSize, provenance: &str) -> Markup {
+        let (drawing, bottom) = match &self.drawing {
+            Drawing::Curves(series) => curves::draw(self, series, looks, size),
+            Drawing::Maps { share_of, panels } => maps::draw(self, share_of, panels, size.width),
+        };
+        let lines = lines_of(provenance, SMALL, size.width - 28.0);
+        let line_at = |line: usize| bottom + 20.0 + 14.0 * line as f64;
+        let height = lines
+            .len()
+            .checked_sub(1)
+            .map_or(bottom, |last| line_at(last) + 10.0);
+        let [width, height] = [size.width, height].map(px);
+        html! {
+            svg xmlns="http://www.w3.org/2000/svg" viewBox={ "0 0 " (width) " " (height) }
+                width=(width) height=(height) role="img" font-size="13" fill="#222"
+                font-family="system-ui, 'DejaVu Sans', Arial, sans-serif" {
+                title { (self.title) }
+                rect width=(width) height=(height) fill="#fff" {}
+                @if size.is_labelled {
+                    text x="14" y="22" font-size="15" font-weight="600" { (self.title) }
+                }
+                (drawing)
+                @for (at, line) in lines.iter().enumerate() {
+                    text x="14" y=(px(line_at(at))) font-size=(SMALL) fill="#666" { (line) }
+                }
+            }
+        }
+    }
+}
+
+/// The words of a text in lines that are no wider than `width`, as far as words allow.
+fn lines_of(text: &str, size: f64, width: f64) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for word in text.split_whitespace() {
+        match lines.last_mut() {
+            Some(line) if text_width(&format!("{line} {word}"), size) <= width => {
+                *line += &format!(" {word}")
+            }
+            _ => lines.push(word.to_owned()),
+        }
+    }
+    lines
+}
+
+/// Width of a text, a little more than it takes.
+fn text_width(text: &str, size: f64) -> f64 {
+    0.58 * size * text.chars().count() as f64
+}
+
+/// A coordinate to a tenth; 0 if it is not finite.
+fn px(value: f64) -> String {
+    let value = if value.is_finite() { value } else { 0.0 };
+    ((value * 10.0).round() / 10.0 + 0.0).to_string()
+}
+
+/// Points as the attributes of lines and polygons have them.
+fn points(places: impl IntoIterator<Item = [f64; 2]>) -> String {
+    let places = places.into_iter().map(|place| place.map(px).join(","));
+    places.collect::<Vec<_>>().join(" ")
+}
+
+/// A text whose `start`, `middle` or `end` (`anchor`) is at a place.
+fn label(at: [f64; 2], anchor: &str, size: f64, text: &str) -> Markup {
+    let [x, y] = at.map(px);
+    html! { text x=(x) y=(y) text-anchor=(anchor) font-size=(size) { (text) } }
+}
+
+/// A text that reads from below.
+fn upward_label(at: [f64; 2], text: &str) -> Markup {
+    let [x, y] = at.map(px);
+    html! {
+        text x=(x) y=(y) text-anchor="middle" transform={ "rotate(-90 " (x) " " (y) ")" } { (text) }
+    }
+}
