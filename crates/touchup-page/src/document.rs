@@ -30,15 +30,17 @@ pub fn printable(markup: &Markup) -> String {
 }
 
 /// A table with a head that printers repeat.
-pub fn table<H: Render, R: IntoIterator<Item: Render>>(
+///
+/// - `rows`: the cells of each, with their tags.
+pub fn table<H: Render>(
     class: &str,
     heads: impl IntoIterator<Item = H>,
-    rows: impl IntoIterator<Item = R>,
+    rows: impl IntoIterator<Item = Markup>,
 ) -> Markup {
     html! {
         table class=(class) {
             thead { tr { @for head in heads { th scope="col" { (head) } } } }
-            tbody { @for row in rows { tr { @for cell in row { td { (cell) } } } } }
+            tbody { @for row in rows { tr { (row) } } }
         }
     }
 }

@@ -72,26 +72,18 @@ impl Spread {
     /// Of values that were measured; `None` where there are none.
     pub fn of(mut values: Vec<f64>) -> Option<Self> {
         values.sort_by(f64::total_cmp);
-        let at = |share: f64| {
-            values
-                .get(((values.len().checked_sub(1)?) as f64 * share).round() as usize)
-                .copied()
-        };
-        Some(Self {
-            median: at(0.5)?,
-            p10: at(0.1)?,
-            p90: at(0.9)?,
-        })
+        let last = values.len().checked_sub(1)? as f64;
+        Some(
+            [0.5, 0.1, 0.9]
+                .map(|share| values[(last * share).round() as usize])
+                .into(),
+        )
     }
 
     /// All three times a factor that is not negative.
     #[must_use]
     pub fn times(self, factor: f64) -> Self {
-        Self {
-            median: self.median * factor,
-            p10: self.p10 * factor,
-            p90: self.p90 * factor,
-        }
+        self.numbers().map(|value| value * factor).into()
     }
 
     /// Median, 10th and 90th percentile.
@@ -100,13 +92,15 @@ impl Spread {
     }
 }
 
+impl From<[f64; 3]> for Spread {
+    fn from([median, p10, p90]: [f64; 3]) -> Self {
+        Self { median, p10, p90 }
+    }
+}
+
 impl From<f64> for Spread {
     fn from(value: f64) -> Self {
-        Self {
-            median: value,
-            p10: value,
-            p90: value,
-        }
+        [value; 3].into()
     }
 }
 
@@ -159,6 +153,16 @@ pub struct Series {
 }
 
 impl Series {
+    /// Marks that a line joins in their order.
+    pub fn joined(name: impl Into<String>, marks: impl IntoIterator<Item = Mark>) -> Self {
+        Self::new(name, LineStroke::Joined, marks)
+    }
+
+    /// A model or a limit through marks in their order.
+    pub fn dashed(name: impl Into<String>, marks: impl IntoIterator<Item = Mark>) -> Self {
+        Self::new(name, LineStroke::Dashed, marks)
+    }
+
     /// Of marks in the order in which they are joined.
     pub fn new(
         name: impl Into<String>,
@@ -219,7 +223,12 @@ pub struct Figure {
 }
 
 impl Figure {
-    /// Begins one with what is drawn.
+    /// Begins one with curves.
+    pub fn curves(id: impl Into<String>, series: impl IntoIterator<Item = Series>) -> Self {
+        Self::of(id, Drawing::Curves(series.into_iter().collect()))
+    }
+
+    /// Begins one with its drawing.
     pub fn of(id: impl Into<String>, drawing: Drawing) -> Self {
         Self {
             id: id.into(),

@@ -6,6 +6,7 @@ mod mesh;
 
 use super::{Chapter, Table};
 pub use case::Extreme;
+use itertools::Itertools;
 
 /// All of them.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,16 +30,12 @@ impl Extremes {
 
     /// The table and its text.
     pub fn chapter(&self) -> Chapter {
-        let wrong: Vec<&str> = self.wrong().map(|row| row.fed.as_str()).collect();
-        let verdict = if wrong.is_empty() {
-            format!("All {} extremes got the right answer.", self.rows.len())
-        } else {
-            format!(
-                "MISSED: {} of {} extremes got a wrong answer: {}.",
-                wrong.len(),
-                self.rows.len(),
-                wrong.join("; ")
-            )
+        let (wrong, all) = (self.wrong().count(), self.rows.len());
+        let verdict = match self.wrong().map(|row| &row.fed).join("; ") {
+            names if wrong > 0 => {
+                format!("MISSED: {wrong} of {all} extremes got a wrong answer: {names}.")
+            }
+            _ => format!("All {all} extremes got the right answer."),
         };
         Chapter::of("Extremes", vec![verdict], vec![], vec![self.table()])
     }

@@ -130,3 +130,8 @@ impl Chapter {
         }
     }
 }
+
+/// A paragraph for each case that did not run.
+pub(crate) fn not_run(reasons: &[String]) -> impl Iterator<Item = String> {
+    reasons.iter().map(|reason| format!("Not run: {reason}."))
+}

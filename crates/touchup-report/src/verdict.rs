@@ -9,99 +9,88 @@ use super::mistakes::{LEAST_NAMED, Mistakes};
 use super::peers::{Peers, PeersAtSize};
 use super::stability::{Integrator, Stability};
 use super::whole_scan::{CaseResult, MethodResult, RefineMethod, ScanResult, WholeScan};
-use crate::{Table, TableCell};
+use crate::Table;
+use itertools::Itertools;
 use touchup_page::number::three_digits;
 
 /// Method and region, step, rate and limits, each with its reason and its cost; `None` where no
 /// method made any scan better.
-#[expect(clippy::too_many_lines)]
 pub fn advice(
     scans: &WholeScan,
     stability: Option<&Stability>,
     cost: Option<&Cost>,
 ) -> Option<Table> {
     let best = by_part(scans, ScanResult::best);
-    let slowest_us = best
-        .iter()
-        .map(|choice| choice.result.per_sample_us.median)
-        .reduce(f64::max)?;
+    let slowest_us = slowest_us(&best)?;
     let [us, percent, rate] = [slowest_us, 0.1 * slowest_us, 1e6 / slowest_us].map(three_digits);
-    let mut answer = format!(
-        "up to {us} µs per sample: at 1 kHz {percent} % of one core, which keeps up with {rate} samples per second"
+    let answer = cost
+        .and_then(|cost| cost.by_faces.last())
+        .map_or(String::new(), |recording| {
+            let us = three_digits(recording.push.median as f64 * 1e-3);
+            format!("; the haptic update answers in {us} µs, the patch follows")
+        });
+    let best_cost = format!(
+        "up to {us} µs per sample: at 1 kHz {percent} % of one core, which keeps up with {rate} samples per second{answer}"
     );
-    if let Some(recording) = cost.and_then(|cost| cost.by_faces.last()) {
-        let answer_us = recording.push.median as f64 * 1e-3;
-        answer += &format!(
-            "; the haptic update answers in {} µs, the patch follows",
-            three_digits(answer_us)
-        );
-    }
     let mut rows = vec![[
         "method and region".to_owned(),
         one_or_each(&best),
         errors(&best),
-        answer,
+        best_cost,
     ]];
     let haptic = by_part(scans, ScanResult::best_haptic);
-    if let Some(us) = haptic
-        .iter()
-        .map(|choice| choice.result.per_sample_us.median)
-        .reduce(f64::max)
-    {
+    rows.extend(self::slowest_us(&haptic).map(|us| {
         let cost = format!("up to {} µs per sample", three_digits(us));
-        rows.push([
+        [
             "haptic update alone".to_owned(),
             one_or_each(&haptic),
             errors(&haptic),
             cost,
-        ]);
-    }
+        ]
+    }));
     if stability.is_some_and(Stability::is_default_stable) {
         rows.push(["step of the face", "lie", "stable in every run", ""].map(str::to_owned));
     }
-    let mut fails = Vec::new();
-    if let Some(quality) = stability
-        .and_then(Stability::default_stable_from_quality)
-        .filter(|quality| *quality > 0.0)
-    {
-        fails.push(format!(
+    let fails = failures(scans, stability);
+    if !fails.is_empty() {
+        rows.push(["not for", &fails, "measured below", ""].map(str::to_owned));
+    }
+    Some(
+        Table::of("verdict", "What to take", &rows)
+            .column("question", |[question, ..]| question.as_str())
+            .column("use this", |[_, answer, ..]| answer.as_str())
+            .column("because", |[.., reason, _]| reason.as_str())
+            .column("cost", |[.., cost]| cost.as_str())
+            .caption("Of the parts that were measured here."),
+    )
+}
+
+fn failures(scans: &WholeScan, stability: Option<&Stability>) -> String {
+    let quality = stability.and_then(Stability::default_stable_from_quality);
+    let narrow = quality.filter(|quality| *quality > 0.0).map(|quality| {
+        format!(
             "triangles narrower than {} of their length",
             three_digits(quality)
-        ));
-    }
-    let of_patch = |scan: &ScanResult| {
+        )
+    });
+    let is_worse = |scan: &&ScanResult| {
         scan.of(RefineMethod::Patch)
             .is_some_and(|patch| !patch.is_sound())
     };
-    for case in &scans.cases {
-        fails.extend(case.scans.iter().filter(|scan| of_patch(scan)).map(|scan| {
-            format!(
-                "{} in edges of {} mm, where the patch made it worse",
-                case.name,
-                three_digits(scan.edge_mm)
-            )
-        }));
-    }
-    if !fails.is_empty() {
-        rows.push([
-            "not for".to_owned(),
-            fails.join("; "),
-            "measured below".to_owned(),
-            String::new(),
-        ]);
-    }
-    Some(Table {
-        id: "verdict".to_owned(),
-        title: "What to take".to_owned(),
-        caption: "Of the parts that were measured here.".to_owned(),
-        heads: ["question", "use this", "because", "cost"]
-            .map(str::to_owned)
-            .to_vec(),
-        rows: rows
-            .into_iter()
-            .map(|row| row.map(TableCell::Text).to_vec())
-            .collect(),
-    })
+    let worse = scans.cases.iter().flat_map(|case| {
+        case.scans.iter().filter(is_worse).map(|scan| {
+            let (name, mm) = (&case.name, three_digits(scan.edge_mm));
+            format!("{name} in edges of {mm} mm, where the patch made it worse")
+        })
+    });
+    narrow.into_iter().chain(worse).join("; ")
+}
+
+fn slowest_us(choices: &[MethodChoice<'_>]) -> Option<f64> {
+    let times = choices
+        .iter()
+        .map(|choice| choice.result.per_sample_us.median);
+    times.reduce(f64::max)
 }
 
 /// The method chosen on a part.
@@ -131,29 +120,28 @@ fn by_part<'a>(
 /// The method, where it is the same on every part, else each with its part.
 fn one_or_each(choices: &[MethodChoice<'_>]) -> String {
     match choices {
-        [first, others @ ..]
-            if others
+        [first, ..]
+            if choices
                 .iter()
-                .all(|choice| choice.result.method == first.result.method) =>
+                .map(|choice| choice.result.method)
+                .all_equal() =>
         {
             first.result.name.clone()
         }
-        _ => join(choices, |choice| {
-            format!("{} on {}", choice.result.name, choice.part)
-        }),
+        _ => {
+            let each = choices.iter();
+            each.map(|choice| format!("{} on {}", choice.result.name, choice.part))
+                .join("; ")
+        }
     }
 }
 
 fn errors(choices: &[MethodChoice<'_>]) -> String {
-    let error = |choice: &MethodChoice<'_>| {
+    let errors = choices.iter().map(|choice| {
         let [now, before] = [choice.result.mean_mm(), choice.before_mm].map(three_digits);
         format!("{}: {before} mm off before, {now} mm after", choice.part)
-    };
-    join(choices, error)
-}
-
-fn join(choices: &[MethodChoice<'_>], text: impl Fn(&MethodChoice<'_>) -> String) -> String {
-    choices.iter().map(text).collect::<Vec<_>>().join("; ")
+    });
+    errors.into_iter().join("; ")
 }
 
 /// The best method and region on each part, and the methods that failed there.
@@ -172,45 +160,38 @@ fn of_case(case: &CaseResult) -> Option<String> {
         .map_or("no method reduced the error".to_owned(), |best| {
             format!("take {}", describe(best))
         });
-    let haptic = scan.best_haptic().map(describe);
-    let failed = scan
-        .methods
-        .iter()
-        .filter(|result| !result.is_sound())
-        .map(|result| result.name.as_str());
-    let failed = Some(failed.collect::<Vec<_>>().join("; ")).filter(|failed| !failed.is_empty());
-    let patch = scan
+    let mut text = format!(
+        "On {}, scanned {} mm off in the mean, {best}.",
+        case.name,
+        three_digits(scan.before.mean_mm())
+    );
+    if let Some(haptic) = scan.best_haptic().map(describe) {
+        text += &format!(" Of the regions of the haptic update alone take {haptic}.");
+    }
+    let failed = scan.methods.iter().filter(|result| !result.is_sound());
+    let failed = failed.map(|result| &result.name).join("; ");
+    if !failed.is_empty() {
+        text += &format!(" Fails here (worse than the scan, or not at the end in time): {failed}.");
+    }
+    if let Some(patch) = scan
         .of(RefineMethod::Patch)
         .filter(|_| case.duration_s > 0.0)
-        .map(|patch| {
-            let rate = case.samples as f64 / case.duration_s;
-            let [rate, percent] =
-                [rate, 100.0 * rate * patch.per_sample_us.median * 1e-6].map(three_digits);
-            format!(" At {rate} samples per second the patch takes {percent} % of one core.")
-        });
-    let texts = [
-        Some(format!(
-            "On {}, scanned {} mm off in the mean, {best}.",
-            case.name,
-            three_digits(scan.before.mean_mm())
-        )),
-        haptic.map(|haptic| format!(" Of the regions of the haptic update alone take {haptic}.")),
-        failed.map(|failed| {
-            format!(" Fails here (worse than the scan, or not at the end in time): {failed}.")
-        }),
-        patch,
-    ];
-    Some(texts.into_iter().flatten().collect())
+    {
+        let rate = case.samples as f64 / case.duration_s;
+        let percent = 100.0 * rate * patch.per_sample_us.median * 1e-6;
+        let [rate, percent] = [rate, percent].map(three_digits);
+        text += &format!(" At {rate} samples per second the patch takes {percent} % of one core.");
+    }
+    Some(text)
 }
 
 /// How many sweeps it takes, and how often the published rule blows up.
 pub fn of_convergence(measured: &Convergence) -> Vec<String> {
-    let [(paper, paper_up), (robust, robust_up)] = [Rule::Paper, Rule::Robust].map(|rule| {
-        (
-            measured.of(rule).count(),
-            measured.of(rule).filter(|run| run.has_blown_up).count(),
-        )
+    let counts = [Rule::Paper, Rule::Robust].map(|rule| {
+        let blown_up = measured.of(rule).filter(|run| run.has_blown_up).count();
+        (measured.of(rule).count(), blown_up)
     });
+    let [(paper, paper_up), (robust, robust_up)] = counts;
     vec![format!(
         "Swept over and over, the published rule blew up on {paper_up} of {paper} scans, the robust mode on {robust_up} of {robust}."
     )]
@@ -225,17 +206,15 @@ pub fn of_coverage(measured: &Coverage) -> Vec<String> {
         .filter(|of| of.holds().is_some())
         .count();
     let contradicted: usize = measured.kinds.iter().map(|of| of.bounds()[1]).sum();
-    let mut text = format!(
-        "Coverage: {} of {judged} kinds in their worlds are stated as well as is demanded",
-        judged - outside.len()
-    );
-    text += &if outside.is_empty() {
-        ".".to_owned()
-    } else {
-        format!("; OUTSIDE: {}.", outside.join("; "))
+    let well = judged - outside.len();
+    let outside = match outside.join("; ") {
+        names if names.is_empty() => ".".to_owned(),
+        names => format!("; OUTSIDE: {names}."),
     };
-    text += &format!(" Lower bounds that the truth contradicts: {contradicted}.");
-    vec![text]
+    vec![format!(
+        "Coverage: {well} of {judged} kinds in their worlds are stated as well as is demanded{outside} Lower bounds that \
+         the truth contradicts: {contradicted}."
+    )]
 }
 
 /// Whether wrong input is named, and sound input is left alone.
@@ -255,11 +234,11 @@ pub fn of_mistakes(measured: &Mistakes) -> Vec<String> {
 
 /// Which step to take, and where even that fails.
 pub fn of_stability(measured: &Stability) -> Vec<String> {
-    let share = |integrator| {
+    let share = |integrator: &Integrator| {
         let shares = measured
             .faces
             .iter()
-            .find(|shares| shares.integrator == integrator)?;
+            .find(|shares| shares.integrator == *integrator)?;
         let stable = three_digits(100.0 * shares.endings.stable_share());
         Some(format!(
             "{integrator} {stable} % of {}",
@@ -267,74 +246,69 @@ pub fn of_stability(measured: &Stability) -> Vec<String> {
         ))
     };
     let others = Integrator::ALL
-        .into_iter()
-        .filter(|&integrator| integrator != Integrator::Lie)
-        .filter_map(share);
-    let mut text = format!(
-        "Step: lie, the default, {} over twelve decades of every parameter; stable were {}. Its exact sub-flows are within {} of \
-         their scale.",
-        if measured.is_default_stable() {
-            "was stable in every run"
-        } else {
-            "was NOT stable in every run"
-        },
-        share(Integrator::Lie)
-            .into_iter()
-            .chain(others)
-            .collect::<Vec<_>>()
-            .join(", "),
-        three_digits(measured.largest_sub_flow_error())
-    );
-    text += &match measured.default_stable_from_quality() {
-        Some(quality) => format!(
-            " It fails on bad triangles: below an altitude of {} of the longest side, some updates are cut back or overshoot.",
-            three_digits(quality)
-        ),
-        None => {
-            " On bad triangles it fails: presses were at fault at every quality that was tried."
-                .to_owned()
-        }
+        .iter()
+        .filter(|integrator| **integrator != Integrator::Lie);
+    let stable = [Integrator::Lie]
+        .iter()
+        .chain(others)
+        .filter_map(share)
+        .join(", ");
+    let verdict = match measured.is_default_stable() {
+        true => "was stable in every run",
+        false => "was NOT stable in every run",
     };
-    vec![text]
+    let error = three_digits(measured.largest_sub_flow_error());
+    let fails = measured.default_stable_from_quality().map_or_else(
+        || "On bad triangles it fails: presses were at fault at every quality that was tried.".to_owned(),
+        |quality| {
+            format!(
+                "It fails on bad triangles: below an altitude of {} of the longest side, some updates are cut back or overshoot.",
+                three_digits(quality)
+            )
+        },
+    );
+    vec![format!(
+        "Step: lie, the default, {verdict} over twelve decades of every parameter; stable were {stable}. Its exact sub-flows \
+         are within {error} of their scale. {fails}"
+    )]
 }
 
 /// Whether what should not happen is met as it should be.
 pub fn of_extremes(measured: &Extremes) -> Vec<String> {
-    let wrong: Vec<&str> = measured
-        .wrong()
-        .map(|extreme| extreme.fed.as_str())
-        .collect();
-    vec![match wrong.as_slice() {
-        [] => "Every extreme that was fed came out right.".to_owned(),
-        wrong => format!("Extremes that came out WRONG: {}.", wrong.join("; ")),
+    let wrong = measured.wrong().map(|extreme| &extreme.fed).join("; ");
+    vec![match &*wrong {
+        "" => "Every extreme that was fed came out right.".to_owned(),
+        wrong => format!("Extremes that came out WRONG: {wrong}."),
     }]
 }
 
 /// The sensor rate that one core keeps up with.
 pub fn of_cost(measured: &Cost) -> Vec<String> {
-    let Some(RecordingCost {
-        faces, edge, push, ..
-    }) = measured.by_faces.last()
-    else {
-        return Vec::new();
+    let of_largest = |RecordingCost {
+                          faces, edge, push, ..
+                      }: &RecordingCost| {
+        let (median, p999) = (push.median as f64, push.p999 as f64);
+        let [us, p999, percent, edge_mm] =
+            [median * 1e-3, p999 * 1e-3, median * 1e-4, edge * 1e3].map(three_digits);
+        let replay = measured
+            .slowest_replay_per_s()
+            .map_or(String::new(), |speed| {
+                format!(
+                    " A recording is replayed with at least {} samples per second.",
+                    three_digits(speed)
+                )
+            });
+        format!(
+            "Rate: on {faces} faces with edges of {edge_mm} mm one push of the default scene, its patch made at the end, takes {us} µs \
+             (p99.9 {p999} µs); at 1 kHz that is {percent} % of one core.{replay}"
+        )
     };
-    let [us, p999, percent] = [
-        push.median as f64 * 1e-3,
-        push.p999 as f64 * 1e-3,
-        push.median as f64 * 1e-4,
-    ];
-    let [us, p999, percent, edge_mm] = [us, p999, percent, edge * 1e3].map(three_digits);
-    let mut text = format!(
-        "Rate: on {faces} faces with edges of {edge_mm} mm one push of the default scene, its patch made at the end, takes {us} µs \
-         (p99.9 {p999} µs); at 1 kHz that is {percent} % of one core."
-    );
-    if let Some(speed) = measured.slowest_replay_per_s() {
-        text += &format!(
-            " A recording is replayed with at least {} samples per second.",
-            three_digits(speed)
-        );
-    }
-    vec![text]
+    measured
+        .by_faces
+        .last()
+        .map(of_largest)
+        .into_iter()
+        .collect()
 }
 
 /// Comparison with the libraries that others would use.
@@ -347,21 +321,20 @@ pub fn of_peers(measured: &Peers) -> Vec<String> {
             size.faces
         ))
     };
-    let ratios: Vec<String> = measured.sizes.iter().filter_map(at_size).collect();
-    let promise = if measured.holds() {
-        "Both promises hold"
-    } else {
-        "A promise is MISSED"
+    let ratios = measured.sizes.iter().filter_map(at_size).join("; ");
+    let promise = match measured.holds() {
+        true => "Both promises hold",
+        false => "A promise is MISSED",
     };
     vec![format!(
-        "Against libraries from PyPI: {}. {promise}: 100 times, and faster than a query.",
-        ratios.join("; ")
+        "Against libraries from PyPI: {ratios}. {promise}: 100 times, and faster than a query."
     )]
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::TableCell;
     use crate::whole_scan::{Reach, TouchedError};
 
     fn result(

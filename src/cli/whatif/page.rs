@@ -129,13 +129,8 @@ fn verdict(report: &WhatIfReport) -> Markup {
 fn keys(report: &WhatIfReport) -> Markup {
     let heads = [("Input", ""), ("A", &*report.a), ("B", &report.b)];
     let heads = heads.map(|(head, name)| html! { (head) " " span.small { (name) } });
-    let rows = report.keys.iter();
-    let rows = rows.map(|(key, [a, b])| {
-        [
-            html! { code { (key) } },
-            html! { (shown(a)) },
-            html! { (shown(b)) },
-        ]
+    let rows = report.keys.iter().map(|(key, [a, b])| {
+        html! { td { code { (key) } } td { (shown(a)) } td { (shown(b)) } }
     });
     html! {
         @if report.keys.is_empty() {
@@ -237,63 +232,55 @@ fn features(report: &WhatIfReport) -> Markup {
     }
 }
 
-fn rows(feature: &FeatureChange) -> Vec<[Markup; 8]> {
-    let id = feature.id_a.or(feature.id_b).unwrap_or_default();
-    let place = feature
-        .center_mm
-        .map(|place| place.map(|mm| format!("{mm:.1}").replace('-', "−")));
+fn rows(feature: &FeatureChange) -> Vec<Markup> {
+    let FeatureChange {
+        kind,
+        id_a,
+        id_b,
+        center_mm,
+        numbers,
+    } = feature;
+    let place = center_mm.map(|place| place.map(|mm| format!("{mm:.1}").replace('-', "−")));
     let place = place.map_or("–".to_owned(), |place| place.join(", "));
-    let begin = |is_first: bool| {
-        let [name, place] = [
-            html! { strong { (feature.kind) " " (id) } },
-            html! { (place) },
-        ];
-        if is_first {
-            [name, place]
-        } else {
-            Default::default()
-        }
-    };
+    let begin =
+        html! { td { strong { (kind) " " (id_a.or(*id_b).unwrap_or_default()) } } td { (place) } };
     let chip = |text: &str| html! { span.chip { (text) } };
-    let alone = match (feature.id_a, feature.id_b) {
+    let alone = match (id_a, id_b) {
         (Some(_), None) => Some("found in A alone"),
         (None, Some(_)) => Some("found in B alone"),
         _ => None,
     };
     if let Some(alone) = alone {
-        let [name, place] = begin(true);
-        let [a, b, c, d, e] = <[Markup; 5]>::default();
-        return vec![[name, place, a, b, c, d, e, chip(alone)]];
+        return vec![html! { (begin) @for _ in 0..5 { td {} } td { (chip(alone)) } }];
     }
     let row = |(at, number): (usize, &NumberChange)| {
-        let (what, unit) = in_words(&number.name);
-        let value = |value: Option<f64>, none| value.map_or(none, |value| fixed(value, 3));
-        let change = match number.a {
-            Some(_) => signed(number.change, 3),
-            None => fixed(number.change, 3),
-        };
-        let none = || "–".to_owned();
-        let soft = |text: String| match number.moved {
-            true => html! { (text) },
-            false => html! { span.still { (text) } },
-        };
-        let [name, place] = begin(at == 0);
-        [
+        let NumberChange {
             name,
-            place,
-            soft(what),
-            soft(value(number.a, none())),
-            soft(value(number.b, none())),
-            soft(format!("{change} {unit}")),
-            soft(value(number.plus_minus, "not known".to_owned())),
-            if number.moved {
-                chip("moves")
-            } else {
-                Markup::default()
-            },
-        ]
+            a,
+            b,
+            change,
+            plus_minus,
+            moved,
+        } = number;
+        let (what, unit) = in_words(name);
+        let value = |value: &Option<f64>| value.map_or("–".to_owned(), |value| fixed(value, 3));
+        let change = if a.is_some() {
+            signed(*change, 3)
+        } else {
+            fixed(*change, 3)
+        };
+        let known = plus_minus.map_or("not known".to_owned(), |known| fixed(known, 3));
+        let cells = [what, value(a), value(b), format!("{change} {unit}"), known];
+        html! {
+            // the feature keeps its name and place
+            @if at == 0 { (begin) } @else { td {} td {} }
+            @for cell in cells {
+                td { @if *moved { (cell) } @else { span.still { (cell) } } }
+            }
+            td { @if *moved { (chip("moves")) } }
+        }
     };
-    feature.numbers.iter().enumerate().map(row).collect()
+    numbers.iter().enumerate().map(row).collect()
 }
 
 /// A number without its unit, and its unit.

@@ -5,7 +5,7 @@ use touchup_page::number::fixed;
 use touchup_page::table;
 
 use super::decisions::shown;
-use crate::io::inspection_file::{AlignmentRecord, InspectionRecord};
+use crate::io::inspection_file::InspectionRecord;
 
 /// The section; without an alignment the meaning of positions.
 pub(super) fn alignment(record: &InspectionRecord) -> Markup {
@@ -18,25 +18,22 @@ pub(super) fn alignment(record: &InspectionRecord) -> Markup {
         };
     };
     let k = record.coverage_factor;
-    let AlignmentRecord {
-        translation_mm: shift,
-        rotation_vector_deg: turn,
-        ..
-    } = found;
+    let mm = |mm: f64| shown(Some(mm));
     let rows = ["x", "y", "z"].into_iter().enumerate().map(|(i, axis)| {
-        [
-            axis.to_owned(),
-            shown(Some(shift[i])),
-            shown(Some(found.translation_std_mm[i] * k)),
-            fixed(turn[i], 4),
-            fixed(found.rotation_std_deg[i] * k, 4),
-        ]
+        let (shift, turn) = (found.translation_mm[i], found.rotation_vector_deg[i]);
+        let (shift_u, turn_u) = (
+            found.translation_std_mm[i] * k,
+            found.rotation_std_deg[i] * k,
+        );
+        html! {
+            td { (axis) } td { (mm(shift)) } td { (mm(shift_u)) }
+            td { (fixed(turn, 4)) } td { (fixed(turn_u, 4)) }
+        }
     });
     let features = found.features.iter().map(|one| {
-        let (id, residual) = (one.feature.to_string(), shown(Some(one.residual_mm)));
-        [one.name.clone(), one.kind.clone(), id, residual]
+        html! { td { (one.name) } td { (one.kind) } td { (one.feature) } td { (mm(one.residual_mm)) } }
     });
-    let [x, y, z] = found.center_mm.map(|mm| shown(Some(mm)));
+    let [x, y, z] = found.center_mm.map(mm);
     let how = match &*found.method {
         "datums" => {
             "By datums in the order of the table: each fixes what those before it leave open."
@@ -51,8 +48,8 @@ pub(super) fn alignment(record: &InspectionRecord) -> Markup {
             (how) " Positions and coordinates are about the frame of the drawing; the uncertainty of the alignment \
             is in their U. The motion takes the frame of the mesh into that of the drawing: a turn by the rotation \
             vector about the origin, then the shift. The U (k = " (k) ") of the shift is that at the middle of the \
-            features, (" (x) ", " (y) ", " (z) ") mm. Residual of places " (shown(Some(found.residual_rms_mm)))
-            " mm root mean square, " (shown(Some(found.residual_max_mm))) " mm at most."
+            features, (" (x) ", " (y) ", " (z) ") mm. Residual of places " (mm(found.residual_rms_mm))
+            " mm root mean square, " (mm(found.residual_max_mm)) " mm at most."
         }
         (table("motion", ["Axis", "Shift, mm", "U, mm", "Rotation vector, °", "U, °"], rows))
         (table("aligned", ["Feature", "Kind", "Id", "Off its nominal place, mm"], features))

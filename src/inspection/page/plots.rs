@@ -1,7 +1,7 @@
 //! Charts of touches: how far each is off, and the force of an arm.
 
 use maud::Markup;
-use touchup_page::figure::{Axis, Drawing, Figure, LineStroke, Mark, Series, Spread};
+use touchup_page::figure::{Axis, Figure, LineStroke, Mark, Series, Spread};
 use touchup_page::number::range;
 use touchup_page::{ChartSize, Looks};
 
@@ -11,12 +11,9 @@ use crate::io::probed_touches_file::TouchLine;
 /// Most curves in one chart.
 const MOST_CURVES: usize = 24;
 
-fn chart(title: &str, axes: [Axis; 2], series: Vec<Series>) -> Markup {
-    let [x, y] = axes;
-    let figure = Figure::of("touches", Drawing::Curves(series)).title(title);
-    figure
-        .axes(x, y)
-        .svg(&Looks::default(), ChartSize::SMALL, "")
+fn chart(title: &str, [x, y]: [Axis; 2], series: impl IntoIterator<Item = Series>) -> Markup {
+    let figure = Figure::curves("touches", series).title(title).axes(x, y);
+    figure.svg(&Looks::default(), ChartSize::SMALL, "")
 }
 
 /// How far the touches are off the ideal surface, µm.
@@ -32,25 +29,16 @@ pub(super) fn residual_plot(evidence: &TouchEvidence) -> Markup {
         false => [from, from + 1.0],
     };
     let stated = (2e3 * evidence.stated_mm).min(reach);
-    let stated = Spread {
-        median: 0.0,
-        p10: -stated,
-        p90: stated,
-    };
-    let touches = evidence
-        .drawn
-        .iter()
-        .map(|[along, off]| Mark::at(*along, off * 1e3));
+    let stated = Spread::from([0.0, -stated, stated]);
+    let touches = evidence.drawn.iter();
+    let touches = touches.map(|[along, off]| Mark::at(*along, off * 1e3));
+    let stated = ends.map(|x| Mark::at(x, stated));
     let axes = [
         Axis::linear(evidence.along, "along").within(ends),
         Axis::linear("off, µm", "off_um").within([-reach, reach]),
     ];
-    let series = vec![
-        Series::new(
-            "stated",
-            LineStroke::Band,
-            ends.map(|x| Mark::at(x, stated)),
-        ),
+    let series = [
+        Series::new("stated", LineStroke::Band, stated),
         Series::new("touches", LineStroke::Dots, touches),
     ];
     chart("touches off the fitted surface", axes, series)
@@ -58,20 +46,17 @@ pub(super) fn residual_plot(evidence: &TouchEvidence) -> Markup {
 
 /// Force against the approach over the travel, of accepted touches; `None` without a curve.
 pub(super) fn force_plot(touches: &[&TouchLine]) -> Option<Markup> {
-    let with_curve = touches
-        .iter()
-        .filter(|touch| touch.accepted && touch.curve.len() > 1);
+    let is_drawn = |touch: &&&TouchLine| touch.accepted && touch.curve.len() > 1;
     // counted from where the force is largest: contact lies there for all
     let curve = |touch: &&TouchLine| {
         let travels = touch.curve.iter().map(|[_, travel, ..]| *travel);
         let deepest = travels.fold(f64::NEG_INFINITY, f64::max);
-        let marks = touch
-            .curve
-            .iter()
-            .map(|[_, travel, force, _]| Mark::at(travel - deepest, *force));
+        let marks = touch.curve.iter();
+        let marks = marks.map(|[_, travel, force, _]| Mark::at(travel - deepest, *force));
         Series::new("force", LineStroke::Course, marks)
     };
-    let curves: Vec<_> = with_curve.take(MOST_CURVES).map(curve).collect();
+    let drawn = touches.iter().filter(is_drawn).take(MOST_CURVES);
+    let curves: Vec<_> = drawn.map(curve).collect();
     let marks = || curves.iter().flat_map(|curve| &curve.marks);
     let (from, _) = range(marks().map(|mark| mark.x.median))?;
     let (least, most) = range(marks().map(|mark| mark.y.median).chain([0.0, 0.5]))?;

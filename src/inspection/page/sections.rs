@@ -8,6 +8,7 @@ use super::input::ReportInput;
 use crate::conformity::{Decision, MeasuredNumber};
 use crate::features::InspectedQuantity;
 use crate::inspection::calibration::CalibrationLine;
+use crate::inspection::rows::Balloon;
 use crate::inspection::words::{first_few, percent};
 use crate::io::features_file::RelationRecord;
 use crate::io::inspection_file::InspectionRecord;
@@ -112,7 +113,7 @@ pub(super) fn form_and_relations(input: &ReportInput<'_>) -> Markup {
         @if !forms.is_empty() { (table("", of_form, forms)) }
         @if !relations.is_empty() {
             h3 { "Relations" }
-            (table("rel", ["Relation", "Of", "To", "Numbers"], relations.iter().take(MOST_RELATIONS)))
+            (table("rel", ["Relation", "Of", "To", "Numbers"], relations.iter().take(MOST_RELATIONS).cloned()))
         }
         @if relations.len() > MOST_RELATIONS {
             p.small {
@@ -123,52 +124,47 @@ pub(super) fn form_and_relations(input: &ReportInput<'_>) -> Markup {
 }
 
 fn with_u(number: &MeasuredNumber, k: f64) -> String {
-    let value = shown(Some(number.value));
-    number.std.map_or(value.clone(), |std| {
-        format!("{value} ± {}", shown(Some(std * k)))
-    })
+    let [value, u] = [Some(number.value), number.std.map(|std| std * k)].map(shown);
+    if number.std.is_some() {
+        format!("{value} ± {u}")
+    } else {
+        value
+    }
 }
 
-fn forms(input: &ReportInput<'_>, k: f64) -> Vec<[String; 6]> {
+fn forms(input: &ReportInput<'_>, k: f64) -> Vec<Markup> {
     let file = &input.source.features;
-    let row = |balloon: &crate::inspection::rows::Balloon| {
+    let row = |balloon: &Balloon| {
         let form = file.feature(balloon.feature?)?.form.as_ref()?;
         let number = |quantity| {
-            form.number(quantity)
-                .map_or("–".to_owned(), |number| with_u(&number, k))
+            let number = form.number(quantity);
+            number.map_or("–".to_owned(), |number| with_u(&number, k))
         };
-        Some([
-            format!("{} · {}", balloon.number, balloon.kind),
-            number(InspectedQuantity::Roundness),
-            number(InspectedQuantity::Cylindricity),
-            number(InspectedQuantity::Straightness),
-            number(InspectedQuantity::Flatness),
-            format!("{:.0} %", form.coverage * 100.0),
-        ])
+        Some(html! {
+            td { (balloon.number) " · " (balloon.kind) }
+            td { (number(InspectedQuantity::Roundness)) }
+            td { (number(InspectedQuantity::Cylindricity)) }
+            td { (number(InspectedQuantity::Straightness)) }
+            td { (number(InspectedQuantity::Flatness)) }
+            td { (format!("{:.0} %", form.coverage * 100.0)) }
+        })
     };
     input.inspected.balloons.iter().filter_map(row).collect()
 }
 
-fn relations(input: &ReportInput<'_>, k: f64) -> Vec<[String; 4]> {
+fn relations(input: &ReportInput<'_>, k: f64) -> Vec<Markup> {
     let file = &input.source.features;
     let balloon = |id: u32| {
-        input
-            .inspected
-            .balloons
-            .iter()
-            .find(|balloon| balloon.feature == Some(id))
+        let mut balloons = input.inspected.balloons.iter();
+        balloons.find(|balloon| balloon.feature == Some(id))
     };
     let name = |id: u32| {
         let kind = file.feature(id).map_or("", |feature| &feature.kind);
-        balloon(id).map_or_else(
-            || format!("{kind}, id {id}"),
-            |balloon| format!("{} · {kind}", balloon.number),
-        )
+        match balloon(id) {
+            Some(balloon) => format!("{} · {kind}", balloon.number),
+            None => format!("{kind}, id {id}"),
+        }
     };
-    let with_balloon = file
-        .relations
-        .iter()
-        .filter(|relation| balloon(relation.of).is_some());
     let row = |relation: &RelationRecord| {
         let numbers = InspectedQuantity::ALL.into_iter().filter_map(|quantity| {
             let number = relation.number(quantity).filter(|_| quantity.needs_datum())?;
@@ -177,41 +173,30 @@ fn relations(input: &ReportInput<'_>, k: f64) -> Vec<[String; 4]> {
             } else {
                 " mm"
             };
-            Some(format!(
-                "{} {}{unit}",
-                in_words(quantity.name()),
-                with_u(&number, k)
-            ))
+            let (name, number) = (in_words(quantity.name()), with_u(&number, k));
+            Some(format!("{name} {number}{unit}"))
         });
         let numbers = numbers.collect::<Vec<_>>().join("; ");
-        [
-            relation.kind.clone(),
-            name(relation.of),
-            name(relation.to),
-            numbers,
-        ]
+        html! {
+            td { (relation.kind) } td { (name(relation.of)) } td { (name(relation.to)) } td { (numbers) }
+        }
     };
-    with_balloon.map(row).collect()
+    let mut relations = file.relations.iter().collect::<Vec<_>>();
+    relations.retain(|relation| balloon(relation.of).is_some());
+    relations.into_iter().map(row).collect()
 }
 
 pub(super) fn calibration(lines: &[CalibrationLine]) -> Markup {
-    let rows = lines
-        .iter()
-        .map(|line| [line.what, &line.value, &line.state]);
+    let row = |line: &CalibrationLine| html! { td { (line.what) } td { (line.value) } td { (line.state) } };
     html! {
         h2 { "State of the calibration" }
-        (table("cal", ["What", "Value", "State and age"], rows))
+        (table("cal", ["What", "Value", "State and age"], lines.iter().map(row)))
     }
 }
 
 pub(super) fn files(record: &InspectionRecord) -> Markup {
     let rows = record.files.iter().map(|file| {
-        [
-            html! { (file.role) },
-            html! { (file.path) },
-            html! { (file.bytes) },
-            html! { code { (file.crc32) } },
-        ]
+        html! { td { (file.role) } td { (file.path) } td { (file.bytes) } td { code { (file.crc32) } } }
     });
     html! {
         h2 { "Files" }

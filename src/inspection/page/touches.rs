@@ -10,6 +10,7 @@ use super::plots::{force_plot, residual_plot};
 use crate::inspection::evidence::{TouchEvidence, probed_behind, touch_evidence, widest_gap_deg};
 use crate::inspection::rows::Balloon;
 use crate::io::features_file::FeatureRecord;
+use crate::io::inspection_file::CharacteristicRecord;
 
 /// The section; says so without touches.
 pub(super) fn touches(input: &ReportInput<'_>) -> Markup {
@@ -50,20 +51,7 @@ fn feature(input: &ReportInput<'_>, balloon: &Balloon) -> Markup {
         let evidence = (!quantity.needs_datum())
             .then(|| touch_evidence(quantity, found, runs, &input.source.touches))
             .flatten();
-        let micrometres = |number: fn(&TouchEvidence) -> f64| {
-            let number = evidence
-                .as_ref()
-                .map(|found| format!("{:.1}", number(found) * 1e3));
-            html! { (number.unwrap_or("–".to_owned())) }
-        };
-        rows.push([
-            html! { (one.number) },
-            html! { (one.name) " " span.small { (in_words(&one.quantity)) } },
-            html! { (one.touches) },
-            micrometres(|found| found.rms_mm),
-            micrometres(|found| found.largest_mm),
-            micrometres(|found| found.stated_mm),
-        ]);
+        rows.push(row(one, evidence.as_ref()));
         let is_depth = one.quantity == "depth_mm";
         if let Some(evidence) = evidence.filter(|_| !drawn.contains(&(runs, is_depth))) {
             drawn.push((runs, is_depth));
@@ -98,6 +86,21 @@ fn feature(input: &ReportInput<'_>, balloon: &Balloon) -> Markup {
             (table("", head, rows))
             div.plots { @for figure in figures { figure { (figure) } } }
         }
+    }
+}
+
+fn row(one: &CharacteristicRecord, evidence: Option<&TouchEvidence>) -> Markup {
+    let micrometres = |number: fn(&TouchEvidence) -> f64| {
+        let number = evidence.map(|found| format!("{:.1}", number(found) * 1e3));
+        number.unwrap_or("–".to_owned())
+    };
+    html! {
+        td { (one.number) }
+        td { (one.name) " " span.small { (in_words(&one.quantity)) } }
+        td { (one.touches) }
+        td { (micrometres(|found| found.rms_mm)) }
+        td { (micrometres(|found| found.largest_mm)) }
+        td { (micrometres(|found| found.stated_mm)) }
     }
 }
 

@@ -2,14 +2,14 @@
 
 use maud::{Markup, html};
 
+use super::element::{label, points, px, text_width, upward_label};
 use super::extent::Extent;
-use super::frame::Frame;
+use super::frame::{ChartSize, Frame};
 use super::looks::Looks;
-use super::{ChartSize, label, points, px, text_width, upward_label};
 use crate::figure::{Figure, LineStroke, Mark, Series};
 
-/// A legend is beside the frame if its names are no wider.
-const WIDEST_BESIDE: f64 = 230.0;
+/// A legend is beside the frame if its lines are no wider.
+const WIDEST_BESIDE: f64 = 230.0 + SAMPLE;
 /// The sample of line and mark in front of a name.
 const SAMPLE: f64 = 34.0;
 /// From line to line of the legend.
@@ -28,58 +28,42 @@ struct Layout {
 
 impl Layout {
     fn of(series: &[Series], y: &Extent, size: ChartSize) -> Self {
-        let widths = |texts: &[&str], letters| {
-            let widths = texts.iter().map(|text| text_width(text, letters));
-            widths.fold(0.0, f64::max)
+        let ticks = y.ticks();
+        let number = widest(ticks.iter().map(|tick| tick.label.as_str()), 12.0);
+        let name = widest(series.iter().map(|one| one.name.as_str()), 12.5) + SAMPLE;
+        let fits_beside = name <= WIDEST_BESIDE && series.len() as f64 * LINE <= size.height;
+        let ([left, top], right, below) = match size.is_labelled {
+            true if fits_beside => ([82.0, 38.0], name + 24.0, 50.0),
+            true => ([82.0, 38.0], 24.0, 50.0),
+            false => ([number + 28.0, 8.0], 14.0, 42.0),
         };
-        let height = size.height;
-        if !size.is_labelled {
-            let ticks = y.ticks();
-            let numbers: Vec<_> = ticks.iter().map(|tick| tick.label.as_str()).collect();
-            let left = widths(&numbers, 12.0) + 28.0;
-            let (top, width) = (8.0, size.width - left - 14.0);
-            return Self {
-                frame: Frame {
-                    left,
-                    top,
-                    width,
-                    height,
-                },
-                legend: [0.0; 2],
-                columns: 1,
-                bottom: top + height + 42.0,
-            };
-        }
-        let names: Vec<_> = series.iter().map(|one| one.name.as_str()).collect();
-        let name = widths(&names, 12.5) + SAMPLE;
-        let (left, top) = (82.0, 38.0);
-        let is_beside = name <= WIDEST_BESIDE + SAMPLE && series.len() as f64 * LINE <= height;
-        let width = size.width - left - 24.0 - if is_beside { name } else { 0.0 };
-        let frame = Frame {
-            left,
-            top,
-            width,
-            height,
-        };
-        let below = frame.bottom() + 50.0;
-        if is_beside {
+        let frame = Frame::new([left, top], [size.width - left - right, size.height]);
+        let bottom = frame.bottom() + below;
+        if fits_beside || !size.is_labelled {
             let legend = [frame.right() + 14.0, top + 12.0];
             return Self {
                 frame,
                 legend,
                 columns: 1,
-                bottom: below,
+                bottom,
             };
         }
         let columns = (((size.width - left) / (name + 20.0)) as usize).max(1);
-        let bottom = below + series.len().div_ceil(columns) as f64 * LINE;
+        let legend = [left, bottom + 12.0];
+        let bottom = bottom + series.len().div_ceil(columns) as f64 * LINE;
         Self {
             frame,
-            legend: [left, below + 12.0],
+            legend,
             columns,
             bottom,
         }
     }
+}
+
+fn widest<'a>(texts: impl Iterator<Item = &'a str>, letters: f64) -> f64 {
+    texts
+        .map(|text| text_width(text, letters))
+        .fold(0.0, f64::max)
 }
 
 /// The drawing, and its lower edge.

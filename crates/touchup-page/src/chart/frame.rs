@@ -2,11 +2,37 @@
 
 use maud::{Markup, html};
 
+use super::element::{label, points, px, text_width};
 use super::extent::{Extent, Tick};
-use super::{label, points, px, text_width};
 
 /// A label closer than this to the one before it is left out.
 const LEAST_GAP: f64 = 8.0;
+
+/// The room that a chart has, in units of which a number on an axis is 12 high.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ChartSize {
+    /// of the whole picture
+    pub width: f64,
+    /// of the frame
+    pub height: f64,
+    /// whether title and legend are drawn
+    pub is_labelled: bool,
+}
+
+impl ChartSize {
+    /// Over the width of a page.
+    pub const PAGE: Self = Self {
+        width: 900.0,
+        height: 400.0,
+        is_labelled: true,
+    };
+    /// A third of that, for one of several beside each other.
+    pub const SMALL: Self = Self {
+        width: 480.0,
+        height: 132.0,
+        is_labelled: false,
+    };
+}
 
 /// The rectangle in which values have places.
 pub(super) struct Frame {
@@ -17,6 +43,16 @@ pub(super) struct Frame {
 }
 
 impl Frame {
+    /// From its upper left corner.
+    pub fn new([left, top]: [f64; 2], [width, height]: [f64; 2]) -> Self {
+        Self {
+            left,
+            top,
+            width,
+            height,
+        }
+    }
+
     pub fn right(&self) -> f64 {
         self.left + self.width
     }

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use maud::{Markup, html};
 
-use super::px;
+use super::element::px;
 use crate::figure::{Drawing, Figure, LineStroke};
 
 /// Colours that colour-blind readers distinguish too (Okabe and Ito), dark enough on white.

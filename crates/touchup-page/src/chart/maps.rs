@@ -2,9 +2,9 @@
 
 use maud::{Markup, html};
 
+use super::element::{label, px, text_width, upward_label};
 use super::extent::Tick;
 use super::frame::Frame;
-use super::{label, px, text_width, upward_label};
 use crate::figure::{Axis, Figure, Panel, Scale};
 use crate::number::{power_of_ten, three_digits};
 
@@ -35,26 +35,17 @@ const COLOURS: [[f64; 3]; 6] = [
 const NOTHING: &str = "#e4e4e4";
 
 /// The drawing, and its lower edge.
-pub(super) fn draw(figure: &Figure, share_of: &str, panels: &[Panel], size: f64) -> (Markup, f64) {
+pub(super) fn draw(figure: &Figure, share_of: &str, panels: &[Panel], page: f64) -> (Markup, f64) {
     // the fewest lines, evenly filled
     let lines = panels.len().div_ceil(ACROSS).max(1);
     let across = panels.len().div_ceil(lines).max(1);
-    let width = (size - LEFT - BAR - (across - 1) as f64 * GAP) / across as f64;
+    let width = (page - LEFT - BAR - (across - 1) as f64 * GAP) / across as f64;
     let height = width.clamp(150.0, 330.0);
     let top = |line: usize| TOP + line as f64 * (NAME + height + BELOW);
-    let frame = |at: usize| Frame {
-        left: LEFT + (at % across) as f64 * (width + GAP),
-        top: top(at / across),
-        width,
-        height,
-    };
-    let (left, width) = (size - BAR + 24.0, 18.0);
-    let bar_frame = Frame {
-        left,
-        top: TOP,
-        width,
-        height,
-    };
+    let size = [width, height];
+    let left = |column: usize| LEFT + column as f64 * (width + GAP);
+    let frame = |at: usize| Frame::new([left(at % across), top(at / across)], size);
+    let bar_frame = Frame::new([page - BAR + 24.0, TOP], [18.0, height]);
     let has_gaps = panels.iter().any(|panel| panel.shares.contains(&None));
     let drawing = html! {
         @for (at, panel) in panels.iter().enumerate() {

@@ -2,6 +2,7 @@
 //! beside the frame and no text that shows when a cell is pointed at.
 
 mod curves;
+mod element;
 mod extent;
 mod frame;
 mod looks;
@@ -9,38 +10,14 @@ mod maps;
 
 use maud::{Markup, html};
 
+use element::{px, text_width};
+pub use frame::ChartSize;
 pub use looks::Looks;
 
 use crate::figure::{Drawing, Figure};
 
 /// Size of the letters of the provenance.
 const SMALL: f64 = 10.5;
-
-/// The room that a chart has, in units of which a number on an axis is 12 high.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ChartSize {
-    /// of the whole picture
-    pub width: f64,
-    /// of the frame
-    pub height: f64,
-    /// whether title and legend are drawn
-    pub is_labelled: bool,
-}
-
-impl ChartSize {
-    /// Over the width of a page.
-    pub const PAGE: Self = Self {
-        width: 900.0,
-        height: 400.0,
-        is_labelled: true,
-    };
-    /// A third of that, for one of several beside each other.
-    pub const SMALL: Self = Self {
-        width: 480.0,
-        height: 132.0,
-        is_labelled: false,
-    };
-}
 
 impl Figure {
     /// The figure as a picture of its own.
@@ -89,35 +66,4 @@ fn lines_of(text: &str, size: f64, width: f64) -> Vec<String> {
         }
     }
     lines
-}
-
-/// Width of a text, a little more than it takes.
-fn text_width(text: &str, size: f64) -> f64 {
-    0.58 * size * text.chars().count() as f64
-}
-
-/// A coordinate to a tenth; 0 if it is not finite.
-fn px(value: f64) -> String {
-    let value = if value.is_finite() { value } else { 0.0 };
-    ((value * 10.0).round() / 10.0 + 0.0).to_string()
-}
-
-/// Points as the attributes of lines and polygons have them.
-fn points(places: impl IntoIterator<Item = [f64; 2]>) -> String {
-    let places = places.into_iter().map(|place| place.map(px).join(","));
-    places.collect::<Vec<_>>().join(" ")
-}
-
-/// A text whose `start`, `middle` or `end` (`anchor`) is at a place.
-fn label(at: [f64; 2], anchor: &str, size: f64, text: &str) -> Markup {
-    let [x, y] = at.map(px);
-    html! { text x=(x) y=(y) text-anchor=(anchor) font-size=(size) { (text) } }
-}
-
-/// A text that reads from below.
-fn upward_label(at: [f64; 2], text: &str) -> Markup {
-    let [x, y] = at.map(px);
-    html! {
-        text x=(x) y=(y) text-anchor="middle" transform={ "rotate(-90 " (x) " " (y) ")" } { (text) }
-    }
 }

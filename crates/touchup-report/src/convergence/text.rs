@@ -1,7 +1,9 @@
 //! Convergence as a chapter of the report.
 
 use super::{Convergence, Decay, MeshErrors, OneFaceRun, OneFaceSample, Rule, SweepRun};
-use crate::{Axis, Chapter, Drawing, Figure, LineStroke, Mark, Series, Table};
+use crate::table::not_run;
+use crate::{Axis, Chapter, Figure, LineStroke, Mark, Series, Table};
+use itertools::Itertools;
 use touchup_page::number::range;
 
 /// Errors of one face below it are roundings.
@@ -12,15 +14,11 @@ const STEPS: usize = 8;
 impl Convergence {
     /// As a part of the report.
     pub fn chapter(&self) -> Chapter {
-        let mut text = vec![self.introduction()];
-        text.extend(Rule::ALL.into_iter().map(|rule| self.verdict(rule)));
-        text.extend(
-            self.failed
-                .iter()
-                .map(|reason| format!("Not run: {reason}.")),
-        );
-        text.extend(self.one_face.iter().map(one_face_text));
-        let mut figures: Vec<Figure> = Rule::ALL.map(|rule| self.figure(rule)).into();
+        let text = std::iter::once(self.introduction())
+            .chain(Rule::ALL.map(|rule| self.verdict(rule)))
+            .chain(not_run(&self.failed))
+            .chain(self.one_face.iter().map(one_face_text));
+        let mut figures = Rule::ALL.map(|rule| self.figure(rule)).to_vec();
         if !self.one_face.is_empty() {
             figures.extend([
                 self.one_face_paths(),
@@ -28,12 +26,8 @@ impl Convergence {
                 self.one_face_normals(),
             ]);
         }
-        Chapter::of(
-            "Convergence from sweep to sweep, and of one face",
-            text,
-            figures,
-            vec![self.table()],
-        )
+        let title = "Convergence from sweep to sweep, and of one face";
+        Chapter::of(title, text.collect(), figures, vec![self.table()])
     }
 
     fn introduction(&self) -> String {
@@ -49,20 +43,21 @@ impl Convergence {
 
     /// Result of the runs of one rule.
     fn verdict(&self, rule: Rule) -> String {
-        let runs: Vec<&SweepRun> = self.of(rule).collect();
-        let converged: Vec<&SweepRun> = runs
-            .iter()
-            .copied()
-            .filter(|run| run.has_converged())
-            .collect();
+        let runs = self.of(rule).collect_vec();
+        let converged = runs.iter().filter(|run| run.has_converged());
         let blown_up = runs.iter().filter(|run| run.has_blown_up).count();
-        let (name, fewer, all) = (capitalised(rule.name()), converged.len(), runs.len());
+        let (name, fewer, all) = (
+            capitalised(rule.name()),
+            converged.clone().count(),
+            runs.len(),
+        );
         let mut text = format!(
             "{name}: {fewer} of {all} scans ended with less error than they began with, {blown_up} blew up."
         );
-        if let Some((least, most)) = range(converged.iter().filter_map(|run| {
+        let left = converged.filter_map(|run| {
             Some(run.errors.last()?.distance_mm / run.errors.first()?.distance_mm)
-        })) {
+        });
+        if let Some((least, most)) = range(left) {
             let (least, most, sweeps) = (least * 100.0, most * 100.0, self.sweeps);
             text += &format!(
                 " Where it converged, {least:.1} to {most:.1} % of the mean error is left after {sweeps} sweeps."
@@ -70,16 +65,12 @@ impl Convergence {
         }
         let (wins, fits) = self.power_wins(rule);
         let mean = |r_squared: fn(&Decay) -> Option<f64>| {
-            let all: Vec<f64> = runs
-                .iter()
-                .filter_map(|run| r_squared(run.decay.as_ref()?))
-                .collect();
+            let all = runs.iter().filter_map(|run| r_squared(run.decay.as_ref()?));
+            let all = all.collect_vec();
             (!all.is_empty()).then(|| all.iter().sum::<f64>() / all.len() as f64)
         };
-        if let (Some(power), Some(exponential)) = (
-            mean(|decay| decay.power.r_squared),
-            mean(|decay| decay.exponential.r_squared),
-        ) {
+        let power = mean(|decay| decay.power.r_squared);
+        if let Some((power, exponential)) = power.zip(mean(|decay| decay.exponential.r_squared)) {
             let exponents = runs.iter().filter_map(|run| Some(-run.decay?.power.slope));
             let (least, most) = range(exponents).unwrap_or_default();
             text += &format!(
@@ -93,30 +84,22 @@ impl Convergence {
     fn figure(&self, rule: Rule) -> Figure {
         let series = self.of(rule).flat_map(|run| {
             let name = format!("scan {}", run.seed);
-            let marks = run
-                .errors
-                .iter()
-                .enumerate()
-                .map(|(sweep, error)| Mark::at(sweep as f64, error.distance_mm));
-            let measured = Series::new(&name, LineStroke::Marks, marks);
+            let marks = (0..).zip(&run.errors);
+            let marks = marks.map(|(sweep, error)| Mark::at(f64::from(sweep), error.distance_mm));
             let laws = run
                 .decay
                 .iter()
-                .flat_map(|decay| drawn(decay, &name, run.errors.len() - 1))
-                .collect::<Vec<_>>();
-            [measured].into_iter().chain(laws)
+                .flat_map(|decay| drawn(decay, &name, run.errors.len() - 1));
+            [Series::new(&name, LineStroke::Marks, marks)]
+                .into_iter()
+                .chain(laws)
+                .collect_vec()
         });
         let (id, measure) = match rule {
-            Rule::Paper => (
-                "convergence_published",
-                "face by face, as the paper measures",
-            ),
-            Rule::Robust => (
-                "convergence_robust",
-                "from the faces' middles to the surface",
-            ),
+            Rule::Paper => ("published", "face by face, as the paper measures"),
+            Rule::Robust => ("robust", "from the faces' middles to the surface"),
         };
-        Figure::of(id, Drawing::Curves(series.collect()))
+        Figure::curves(format!("convergence_{id}"), series)
             .title(format!("Mean distance error from sweep to sweep, {}", rule.name()))
             .axes(Axis::linear("sweep", "sweep"), Axis::log("mean distance error, mm", "distance_error_mm"))
             .caption(format!(
@@ -129,25 +112,18 @@ impl Convergence {
     /// Fig 6.
     fn one_face_paths(&self) -> Figure {
         let series = self.one_face.iter().flat_map(|run| {
+            let name = one_face_name(run);
             let path = |of: fn(&OneFaceSample) -> [f64; 3]| {
                 run.samples
                     .iter()
                     .map(move |sample| Mark::at(of(sample)[0], of(sample)[2]))
             };
             [
-                Series::new(
-                    format!("{}, b*", one_face_name(run)),
-                    LineStroke::Joined,
-                    path(|sample| sample.barycentre_mm),
-                ),
-                Series::new(
-                    format!("{}, tip", one_face_name(run)),
-                    LineStroke::Dashed,
-                    path(|sample| sample.tip_mm),
-                ),
+                Series::joined(format!("{name}, b*"), path(|sample| sample.barycentre_mm)),
+                Series::dashed(format!("{name}, tip"), path(|sample| sample.tip_mm)),
             ]
         });
-        Figure::of("one_face_path", Drawing::Curves(series.collect()))
+        Figure::curves("one_face_path", series)
             .title("One face: barycentre and tip, seen from the side")
             .axes(Axis::linear("x, mm", "x_mm"), Axis::linear("z, mm", "z_mm"))
             .caption(
@@ -181,14 +157,11 @@ impl Convergence {
         error: fn(&OneFaceSample) -> f64,
     ) -> Figure {
         let series = self.one_face.iter().map(|run| {
-            let marks = run
-                .samples
-                .iter()
-                .map(|sample| Mark::at(sample.time_s, error(sample).max(DRAWN_FROM)));
-            Series::new(one_face_name(run), LineStroke::Dashed, marks)
+            let mark =
+                |sample: &OneFaceSample| Mark::at(sample.time_s, error(sample).max(DRAWN_FROM));
+            Series::dashed(one_face_name(run), run.samples.iter().map(mark))
         });
-        Figure::of(id, Drawing::Curves(series.collect()))
-            .axes(Axis::linear("time, s", "time_s"), Axis::log(label, column))
+        Figure::curves(id, series).axes(Axis::linear("time, s", "time_s"), Axis::log(label, column))
     }
 
     fn table(&self) -> Table {
@@ -225,20 +198,21 @@ fn one_face_name(run: &OneFaceRun) -> String {
 /// When which error is down to a tenth, and what is left at the end.
 fn one_face_text(run: &OneFaceRun) -> String {
     let tenth = |error: fn(&OneFaceSample) -> f64| {
-        run.time_to_share(0.1, error)
-            .map_or("not within the run".to_owned(), |time_s| {
-                format!("after {time_s:.2} s")
-            })
+        let time_s = run.time_to_share(0.1, error);
+        time_s.map_or("not within the run".to_owned(), |time_s| {
+            format!("after {time_s:.2} s")
+        })
     };
-    let (distance, normal) = (
-        tenth(|sample| sample.distance_mm),
-        tenth(|sample| sample.normal_deg),
-    );
+    let distance = tenth(|sample| sample.distance_mm);
+    let normal = tenth(|sample| sample.normal_deg);
     let left = run.samples.last().map_or(String::new(), |last| {
-        format!(
-            "; after {:.0} s {:.1e} mm and {:.1e} degrees are left",
-            last.time_s, last.distance_mm, last.normal_deg
-        )
+        let OneFaceSample {
+            time_s,
+            distance_mm,
+            normal_deg,
+            ..
+        } = last;
+        format!("; after {time_s:.0} s {distance_mm:.1e} mm and {normal_deg:.1e} degrees are left")
     });
     format!(
         "One face, {}: the distance is down to a tenth for good {distance}, the angle {normal}{left}.",
@@ -253,7 +227,7 @@ fn drawn(decay: &Decay, name: &str, sweeps: usize) -> [Series; 2] {
         let marks = (0..=STEPS * (sweeps - 1))
             .map(at)
             .map(|sweep| Mark::at(sweep, decay.at(sweep)[which]));
-        Series::new(format!("{name}, {law}"), LineStroke::Dashed, marks)
+        Series::dashed(format!("{name}, {law}"), marks)
     })
 }
 

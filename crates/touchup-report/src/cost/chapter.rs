@@ -4,7 +4,8 @@ use super::{
     Cost, LARGEST_RATIO, LAW_UP_TO, LEAST_REPLAY_PER_S, PartCost, READING, RecordingCost,
     ReplaySpeed, SizeCost,
 };
-use crate::{Axis, Chapter, Drawing, Figure, LineStroke, Mark, Series, Spread, Table};
+use crate::{Axis, Chapter, Figure, Mark, Series, Spread, Table};
+use itertools::Itertools;
 use touchup_page::number::three_digits;
 use touchup_sim::wavy::RADIUS;
 
@@ -27,17 +28,14 @@ impl Cost {
             self.ratio_text(),
             self.part_text(),
             self.replay_text(),
+            Some(self.count_text()),
         ];
-        let text = texts
-            .into_iter()
-            .flatten()
-            .chain([self.count_text()])
-            .collect();
         let figures = vec![
             self.edge_figure(),
             self.faces_figure(),
             self.cheapest_figure(),
         ];
+        let text = texts.into_iter().flatten().collect();
         Chapter::of("Cost of each stage", text, figures, self.tables())
     }
 
@@ -56,53 +54,39 @@ impl Cost {
     }
 
     fn faces_figure(&self) -> Figure {
-        let axis = Axis::log("faces of the scan", "faces");
-        let of_edge = |recordings: &[RecordingCost]| {
-            let edge = format!(
-                ", {:.2} mm",
-                recordings
-                    .first()
-                    .map_or(0.0, |recording| recording.edge * 1e3)
-            );
-            recording_curves(recordings, &edge, |recording| recording.faces as f64)
-        };
         let curves = self
             .by_faces
             .chunk_by(|a, b| a.edge == b.edge)
-            .flat_map(of_edge)
-            .collect();
-        recording_figure("push_time_by_faces", axis, curves)
-            .title("A recording refined, against the faces of the scan, on edges of two lengths")
-            .caption(HOW)
+            .flat_map(|recordings| {
+                let edge = format!(", {:.2} mm", recordings[0].edge * 1e3);
+                recording_curves(recordings, &edge, |recording| recording.faces as f64)
+            });
+        recording_figure(
+            "push_time_by_faces",
+            Axis::log("faces of the scan", "faces"),
+            curves,
+        )
+        .title("A recording refined, against the faces of the scan, on edges of two lengths")
+        .caption(HOW)
     }
 
     fn cheapest_figure(&self) -> Figure {
-        let curve = |name: &str, stroke: LineStroke, time: &dyn Fn(&SizeCost) -> Spread| {
-            let marks = self
-                .sizes
-                .iter()
-                .map(|size| Mark::at(size.faces as f64, time(size).times(1e-3)));
-            Series::new(name, stroke, marks)
+        let marks = |time: &dyn Fn(&SizeCost) -> Spread| {
+            let mark = |size: &SizeCost| Mark::at(size.faces as f64, time(size).times(1e-3));
+            self.sizes.iter().map(mark).collect_vec()
         };
-        let mut curves = vec![
-            curve("hand-written loop", LineStroke::Joined, &|size| {
-                size.minimal.time_ns
-            }),
-            curve("the loop, keeping", LineStroke::Joined, &|size| {
-                size.keeping.time_ns
-            }),
-            curve("cheapest scene", LineStroke::Joined, &|size| {
-                size.barest.time_ns
-            }),
-        ];
-        if let Some(law) = self.barest_law {
-            curves.push(curve(
+        let law = self.barest_law.map(|law| {
+            Series::dashed(
                 "law of the cheapest scene",
-                LineStroke::Dashed,
-                &|size| law.at(size.faces).into(),
-            ));
-        }
-        Figure::of("cheapest_push_by_faces", Drawing::Curves(curves))
+                marks(&|size| law.at(size.faces).into()),
+            )
+        });
+        let curves = [
+            Series::joined("hand-written loop", marks(&|size| size.minimal.time_ns)),
+            Series::joined("the loop, keeping", marks(&|size| size.keeping.time_ns)),
+            Series::joined("cheapest scene", marks(&|size| size.barest.time_ns)),
+        ];
+        Figure::curves("cheapest_push_by_faces", curves.into_iter().chain(law))
             .title("The cheapest push against the size of the scan")
             .axes(Axis::log("faces of the scan", "faces"), Axis::log("time of one push, µs", "push_us"))
             .caption(format!(
@@ -112,30 +96,23 @@ impl Cost {
     }
 
     fn recording_text(&self) -> Option<String> {
-        let all = || self.by_edge.iter().chain(&self.by_faces);
         let ends = |of: fn(&RecordingCost) -> f64| {
+            let all = self.by_edge.iter().chain(&self.by_faces);
             let order = |a: &&RecordingCost, b: &&RecordingCost| of(a).total_cmp(&of(b));
-            let said = |recording: &RecordingCost| {
-                let value = three_digits(of(recording));
+            // of equals the first is the least, and the last is the most
+            let ends = [all.clone().min_by(order)?, all.max_by(order)?];
+            Some(ends.map(|recording| {
+                let (faces, edge_mm) = (recording.faces, recording.edge * 1e3);
                 (
-                    value,
-                    format!(
-                        "{} faces, edges of {:.2} mm",
-                        recording.faces,
-                        recording.edge * 1e3
-                    ),
+                    three_digits(of(recording)),
+                    format!("{faces} faces, edges of {edge_mm:.2} mm"),
                 )
-            };
-            all()
-                .min_by(order)
-                .map(said)
-                .zip(all().max_by(order).map(said))
+            }))
         };
-        let ((least, fastest), (most, slowest)) =
-            ends(|recording| recording.push.median as f64 * 1e-3)?;
-        let (_, (p999, longest)) = ends(|recording| recording.push.p999 as f64 * 1e-3)?;
-        let ((share, coarse), (times, fine)) =
-            ends(|recording| recording.peer.median as f64 / recording.push.median.max(1) as f64)?;
+        let [(least, fastest), (most, slowest)] = ends(|one| us(one.push.median))?;
+        let [_, (p999, longest)] = ends(|one| us(one.push.p999))?;
+        let [(share, coarse), (times, fine)] =
+            ends(|one| one.peer.median as f64 / one.push.median.max(1) as f64)?;
         Some(format!(
             "A push of the default scene, its patch made at the end, takes {least} µs ({fastest}) to {most} µs ({slowest}) in the median \
              and at most {p999} µs in p99.9 ({longest}). The index of parry3d alone, brought up to date after the vertices within one \
@@ -147,23 +124,25 @@ impl Cost {
 
     fn size_text(&self) -> Option<String> {
         let (first, last) = (self.sizes.first()?, self.sizes.last()?);
-        let more = last.faces as f64 / first.faces as f64;
-        let (from, to) = (first.barest.time_ns.median, last.barest.time_ns.median);
+        let [from, to] = [first, last].map(|size| size.barest.time_ns.median);
         let expected = self.barest_law.map_or(String::new(), |law| {
-            let times = to / law.at(last.faces);
+            let (times, megabytes) = (to / law.at(last.faces), last.bytes() * 1e-6);
             let verdict = if times <= NO_MORE {
                 "no more than the logarithm says".to_owned()
             } else {
-                format!("beyond the logarithm, with {:.0} MB of mesh and tree", last.bytes() * 1e-6)
+                format!("beyond the logarithm, with {megabytes:.0} MB of mesh and tree")
             };
             format!(" ({times:.2} times what the logarithmic law of the small scans foretells: {verdict})")
         });
-        Some(format!(
-            "On a scan of {more:.0} times the faces ({} instead of {}) the cheapest scene takes {:.2} µs instead of {:.2} µs{expected}.",
+        let (faces, instead, more) = (
             last.faces,
             first.faces,
-            to * 1e-3,
-            from * 1e-3
+            last.faces as f64 / first.faces as f64,
+        );
+        let [from, to] = [from, to].map(|ns| ns * 1e-3);
+        Some(format!(
+            "On a scan of {more:.0} times the faces ({faces} instead of {instead}) the cheapest scene takes {to:.2} µs instead \
+             of {from:.2} µs{expected}."
         ))
     }
 
@@ -174,43 +153,39 @@ impl Cost {
                 .map(|size| ratio(size).median)
                 .max_by(f64::total_cmp)
         };
-        let (worst, keeping) = (
-            largest(|size| size.barest_to_minimal)?,
-            largest(|size| size.barest_to_keeping)?,
-        );
+        let worst = largest(|size| size.barest_to_minimal)?;
+        let keeping = largest(|size| size.barest_to_keeping)?;
+        let verdict = if worst <= LARGEST_RATIO {
+            "within"
+        } else {
+            "this misses"
+        };
         Some(format!(
             "A part that a scene says is off costs nothing: the cheapest scene takes at most {worst:.3} times as long as the loop \
-             that is written by hand, on the same samples in turns; {} the {LARGEST_RATIO} that is allowed. Against the same \
+             that is written by hand, on the same samples in turns; {verdict} the {LARGEST_RATIO} that is allowed. Against the same \
              loop made to keep what it looked up, as the refiner does (which boxes to bring up to date, with a margin, and what \
              is near), it is {keeping:.3} times.",
-            if worst <= LARGEST_RATIO {
-                "within"
-            } else {
-                "this misses"
-            }
         ))
     }
 
     fn part_text(&self) -> Option<String> {
         let faces = self.parts.iter().map(|part| part.faces).max()?;
-        let parts = self
-            .parts
-            .iter()
-            .filter(|part| part.faces == faces)
-            .map(|part| {
-                let PartCost {
-                    part: name,
-                    cost_ns,
-                    without,
-                    ..
-                } = part;
+        let parts = self.parts.iter().filter(|part| part.faces == faces);
+        let mut parts = parts.map(
+            |PartCost {
+                 part,
+                 cost_ns,
+                 without,
+                 ..
+             }| {
                 let is_lost = cost_ns.median.abs() < DISCERNIBLE * without.time_ns.median;
                 let noise = if is_lost { " (within the noise)" } else { "" };
-                format!("{name} {:+.0} ns{noise}", cost_ns.median)
-            });
+                format!("{part} {:+.0} ns{noise}", cost_ns.median)
+            },
+        );
         Some(format!(
             "What the parts cost, as the difference of whole pushes with and without them on {faces} faces: {}.",
-            parts.collect::<Vec<_>>().join(", ")
+            parts.join(", ")
         ))
     }
 
@@ -222,28 +197,26 @@ impl Cost {
     }
 
     fn replay_text(&self) -> Option<String> {
-        let replays = self.replays.iter().map(
-            |ReplaySpeed {
-                 scene,
-                 edge_mm,
-                 samples_per_s,
-                 ..
-             }| {
-                let verdict = match samples_per_s.median >= LEAST_REPLAY_PER_S {
-                    _ if scene == READING => String::new(),
-                    true => format!(" (holds {LEAST_REPLAY_PER_S:.0})"),
-                    false => format!(" (misses {LEAST_REPLAY_PER_S:.0})"),
-                };
-                format!(
-                    "{:.0} samples per second, scene {scene}, edges of {edge_mm:.2} mm{verdict}",
-                    samples_per_s.median
-                )
-            },
-        );
+        let mut replays = self.replays.iter().map(|replay| {
+            let ReplaySpeed {
+                scene,
+                edge_mm,
+                samples_per_s: Spread { median, .. },
+                ..
+            } = replay;
+            let verdict = match *median >= LEAST_REPLAY_PER_S {
+                _ if scene == READING => String::new(),
+                true => format!(" (holds {LEAST_REPLAY_PER_S:.0})"),
+                false => format!(" (misses {LEAST_REPLAY_PER_S:.0})"),
+            };
+            format!(
+                "{median:.0} samples per second, scene {scene}, edges of {edge_mm:.2} mm{verdict}"
+            )
+        });
         let faces = self.replays.first()?.faces;
         Some(format!(
             "A recording is replayed by one thread, from the file to the moved mesh of {faces} faces: {}.",
-            replays.collect::<Vec<_>>().join("; ")
+            replays.join("; ")
         ))
     }
 
@@ -254,17 +227,16 @@ impl Cost {
             .filter(|part| part.is_default)
             .map(|part| &part.with);
         let pushes = self.sizes.iter().map(|size| &size.barest).chain(default);
-        let Some(most) = pushes
+        let bound = match pushes
             .filter_map(|push| push.allocations)
             .max_by(f64::total_cmp)
-        else {
-            return "This program does not count allocations, so their columns are empty."
-                .to_owned();
-        };
-        let bound = if most == 0.0 {
-            "never asks".to_owned()
-        } else {
-            format!("asks {most:.2e} times")
+        {
+            None => {
+                return "This program does not count allocations, so their columns are empty."
+                    .to_owned();
+            }
+            Some(0.0) => "never asks".to_owned(),
+            Some(most) => format!("asks {most:.2e} times"),
         };
         format!(
             "A push that is warm {bound} for memory, counted by the allocator itself over every timed push."
@@ -328,6 +300,10 @@ impl Cost {
     }
 }
 
+fn us(ns: u64) -> f64 {
+    ns as f64 * 1e-3
+}
+
 /// Pushes, the whole, and the peer, against `x`.
 ///
 /// - `more`: behind each name.
@@ -335,56 +311,38 @@ fn recording_curves(
     recordings: &[RecordingCost],
     more: &str,
     x: impl Fn(&RecordingCost) -> f64,
-) -> Vec<Series> {
-    let curve = |name: &str, stroke, time_us: &dyn Fn(&RecordingCost) -> f64| {
-        let marks = recordings
-            .iter()
-            .map(|recording| Mark::at(x(recording), time_us(recording)));
-        Series::new(format!("{name}{more}"), stroke, marks)
+) -> [Series; 5] {
+    let curve = |name: &str, time_us: fn(&RecordingCost) -> f64| {
+        let marks = recordings.iter().map(|one| Mark::at(x(one), time_us(one)));
+        Series::joined(format!("{name}{more}"), marks)
     };
-    let us = |ns: u64| ns as f64 * 1e-3;
-    vec![
-        curve("push, median", LineStroke::Joined, &|recording| {
-            us(recording.push.median)
-        }),
-        curve("push, p99", LineStroke::Joined, &|recording| {
-            us(recording.push.p99)
-        }),
-        curve("push, p99.9", LineStroke::Joined, &|recording| {
-            us(recording.push.p999)
-        }),
-        curve("end to end", LineStroke::Joined, &|recording| {
-            recording.whole_us
-        }),
-        curve("index of parry3d", LineStroke::Joined, &|recording| {
-            us(recording.peer.median)
-        }),
+    [
+        curve("push, median", |one| us(one.push.median)),
+        curve("push, p99", |one| us(one.push.p99)),
+        curve("push, p99.9", |one| us(one.push.p999)),
+        curve("end to end", |one| one.whole_us),
+        curve("index of parry3d", |one| us(one.peer.median)),
     ]
 }
 
-fn recording_figure(id: &str, x: Axis, curves: Vec<Series>) -> Figure {
-    Figure::of(id, Drawing::Curves(curves)).axes(x, Axis::log("time per sample, µs", "sample_us"))
+fn recording_figure(id: &str, x: Axis, curves: impl IntoIterator<Item = Series>) -> Figure {
+    Figure::curves(id, curves).axes(x, Axis::log("time per sample, µs", "sample_us"))
 }
 
 fn recording_table(id: &str, title: &str, recordings: &[RecordingCost]) -> Table {
-    let us = |ns: u64| ns as f64 * 1e-3;
     Table::of(id, title, recordings)
-        .column("edge, mm", |recording| recording.edge * 1e3)
-        .column("faces", |recording| recording.faces)
-        .column("samples", |recording| recording.samples)
-        .column("push, median, µs", |recording| us(recording.push.median))
-        .column("push, p99, µs", |recording| us(recording.push.p99))
-        .column("push, p99.9, µs", |recording| us(recording.push.p999))
-        .column("until the first push, ms", |recording| recording.begin_ms)
-        .column("patch at the end, ms", |recording| recording.patch_ms)
-        .column("end to end, µs per sample", |recording| recording.whole_us)
-        .column("parry3d, median, µs", |recording| {
-            us(recording.peer.median)
-        })
-        .column("parry3d, p99, µs", |recording| us(recording.peer.p99))
-        .column("parry3d, p99.9, µs", |recording| us(recording.peer.p999))
-        .column("vertices moved for parry3d", |recording| {
-            recording.peer_moves
-        })
+        .column("edge, mm", |one| one.edge * 1e3)
+        .column("faces", |one| one.faces)
+        .column("samples", |one| one.samples)
+        .column("push, median, µs", |one| us(one.push.median))
+        .column("push, p99, µs", |one| us(one.push.p99))
+        .column("push, p99.9, µs", |one| us(one.push.p999))
+        .column("until the first push, ms", |one| one.begin_ms)
+        .column("patch at the end, ms", |one| one.patch_ms)
+        .column("end to end, µs per sample", |one| one.whole_us)
+        .column("parry3d, median, µs", |one| us(one.peer.median))
+        .column("parry3d, p99, µs", |one| us(one.peer.p99))
+        .column("parry3d, p99.9, µs", |one| us(one.peer.p999))
+        .column("vertices moved for parry3d", |one| one.peer_moves)
         .caption(HOW)
 }

@@ -1,7 +1,9 @@
 //! Coverage as a chapter of the report.
 
 use super::{Coverage, CoverageKind, HONEST, KindInWorld, SIGMAS_95};
-use crate::{Axis, Chapter, Drawing, Figure, LineStroke, Mark, Series, Table, TableCell};
+use crate::table::not_run;
+use crate::{Axis, Chapter, Figure, LineStroke, Mark, Series, Table, TableCell};
+use itertools::Itertools;
 use touchup_page::number::three_digits;
 use touchup_sim::SimWorld;
 
@@ -14,12 +16,8 @@ const PARTS: usize = 20;
 impl Coverage {
     /// As a part of the report.
     pub fn chapter(&self) -> Chapter {
-        let mut text = vec![self.introduction()];
-        text.extend(
-            self.failed
-                .iter()
-                .map(|reason| format!("Not run: {reason}.")),
-        );
+        let text = std::iter::once(self.introduction()).chain(not_run(&self.failed));
+        let is_of_feature = |kind: CoverageKind| !kind.is_of_vertices();
         let figures = vec![
             self.figure("coverage_rms"),
             self.curves(
@@ -27,32 +25,24 @@ impl Coverage {
                 "vertices",
                 CoverageKind::is_of_vertices,
             ),
-            self.curves("coverage_features", "features", |kind| {
-                !kind.is_of_vertices()
-            }),
+            self.curves("coverage_features", "features", is_of_feature),
         ];
-        Chapter::of(
-            "Coverage: errors over stated uncertainties",
-            text,
-            figures,
-            vec![self.table()],
-        )
+        let title = "Coverage: errors over stated uncertainties";
+        Chapter::of(title, text.collect(), figures, vec![self.table()])
     }
 
     fn introduction(&self) -> String {
-        let worlds: Vec<&str> = self
-            .params
-            .worlds
-            .iter()
-            .map(|world| world.name())
-            .collect();
         format!(
             "A plate with two holes, a slot, a boss and a step, scanned and touched in the simulated worlds {}, seeds {} to {} of each. \
              A world draws tip, bending, clocks, tare, friction, sensors, scan and hand; the program is told what a calibration leaves, \
              and that uncertainty with it. Seed by seed the hand goes around in the holes, into none, half around, and a third of the way. \
              Error over stated standard deviation has a root mean square of 1 where the statement holds; 0.8 to 1.25 is demanded, and \
              93 % of the vertices within 1.96 standard deviations, at edges and rims 90 %. The root mean square of n numbers is itself known to 1/√(2n).",
-            worlds.join(", "),
+            self.params
+                .worlds
+                .iter()
+                .map(|world| world.name())
+                .join(", "),
             self.params.seeds.start(),
             self.params.seeds.end(),
         )
@@ -62,21 +52,14 @@ impl Coverage {
     pub fn outside(&self) -> Vec<String> {
         let line = |of: &KindInWorld| {
             let rms = three_digits(of.rms_score()?);
-            let within = of.share_within().map_or_else(String::new, |share| {
+            let within = of.share_within().map_or(String::new(), |share| {
                 format!(", {:.0} % within", share * 100.0)
             });
-            Some(format!(
-                "{} in {} ({rms}{within}, n {})",
-                of.kind.name(),
-                of.world.name(),
-                of.count()
-            ))
+            let (kind, world, count) = (of.kind.name(), of.world.name(), of.count());
+            Some(format!("{kind} in {world} ({rms}{within}, n {count})"))
         };
-        self.kinds
-            .iter()
-            .filter(|of| of.holds() == Some(false))
-            .filter_map(line)
-            .collect()
+        let outside = self.kinds.iter().filter(|of| of.holds() == Some(false));
+        outside.filter_map(line).collect()
     }
 
     fn table(&self) -> Table {
@@ -105,24 +88,21 @@ impl Coverage {
     /// Root mean square of each kind, one series a world.
     fn figure(&self, id: &str) -> Figure {
         let worlds = self.params.worlds.iter().map(|&world| {
-            let marks = self
-                .of(world)
-                .filter_map(|of| Some(Mark::at(of.kind as usize as f64 + 1.0, of.rms_score()?)));
-            Series::new(world.name(), LineStroke::Marks, marks)
-        });
-        let ends = [0.5, CoverageKind::ALL.len() as f64 + 0.5];
-        let band = HONEST.map(|level| {
+            let mark =
+                |of: &KindInWorld| Some(Mark::at(of.kind as usize as f64 + 1.0, of.rms_score()?));
             Series::new(
-                three_digits(level),
-                LineStroke::Dashed,
-                ends.map(|x| Mark::at(x, level)),
+                world.name(),
+                LineStroke::Marks,
+                self.of(world).filter_map(mark),
             )
         });
-        let names = CoverageKind::ALL
-            .iter()
-            .enumerate()
-            .map(|(i, kind)| format!("{} {}", i + 1, kind.name()));
-        Figure::of(id, Drawing::Curves(worlds.chain(band).collect()))
+        let ends = [0.5, CoverageKind::ALL.len() as f64 + 0.5];
+        let band = HONEST
+            .map(|level| Series::dashed(three_digits(level), ends.map(|x| Mark::at(x, level))));
+        let mut names = (1..)
+            .zip(CoverageKind::ALL)
+            .map(|(i, kind)| format!("{i} {}", kind.name()));
+        Figure::curves(id, worlds.chain(band))
             .title("Root mean square of error over stated standard deviation")
             .axes(
                 Axis::linear("kind of number", "kind"),
@@ -130,7 +110,7 @@ impl Coverage {
             )
             .caption(format!(
                 "Dashed: the demanded band. Kinds: {}.",
-                names.collect::<Vec<_>>().join(", ")
+                names.join(", ")
             ))
     }
 
@@ -138,28 +118,19 @@ impl Coverage {
     fn curves(&self, id: &str, what: &str, is_meant: fn(CoverageKind) -> bool) -> Figure {
         let at = |i: usize| LARGEST_SCORE * i as f64 / MARKS as f64;
         let worlds = self.params.worlds.iter().filter_map(|&world| {
-            let mut scores: Vec<f64> = self
-                .of(world)
-                .filter(|of| is_meant(of.kind))
-                .flat_map(KindInWorld::scores)
-                .map(f64::abs)
-                .collect();
-            scores.sort_by(f64::total_cmp);
+            let of = self.of(world).filter(|of| is_meant(of.kind));
+            let scores = of.flat_map(KindInWorld::scores).map(f64::abs);
+            let scores = scores.sorted_by(f64::total_cmp).collect_vec();
             let share =
                 |x: f64| scores.partition_point(|score| *score <= x) as f64 / scores.len() as f64;
             let marks = (0..=MARKS).map(|i| Mark::at(at(i), share(at(i))));
-            (!scores.is_empty()).then(|| Series::new(world.name(), LineStroke::Joined, marks))
+            (!scores.is_empty()).then(|| Series::joined(world.name(), marks))
         });
         let scaled = HONEST.into_iter().chain([1.0]).map(|factor| {
             let marks = (0..=MARKS).map(|i| Mark::at(at(i), normal_within(at(i) / factor)));
-            Series::new(
-                format!("normal, rms {}", three_digits(factor)),
-                LineStroke::Dashed,
-                marks,
-            )
+            Series::dashed(format!("normal, rms {}", three_digits(factor)), marks)
         });
-        let series = worlds.chain(scaled).collect();
-        Figure::of(id, Drawing::Curves(series))
+        Figure::curves(id, worlds.chain(scaled))
             .title(format!("Share of {what} within so many stated standard deviations"))
             .axes(Axis::linear("|error| / stated std", "score"), Axis::linear("share", "share"))
             .caption(format!(
@@ -177,19 +148,14 @@ impl Coverage {
 fn normal_within(x: f64) -> f64 {
     let parts = 2 * PARTS * (1 + x as usize);
     let density = |t: f64| (-t * t / 2.0).exp() * (2.0 / std::f64::consts::PI).sqrt();
-    let weight = |i: usize| {
-        if i == 0 || i == parts {
-            1.0
-        } else if i % 2 == 1 {
-            4.0
-        } else {
-            2.0
-        }
+    let weight = |i: usize| match i {
+        _ if i == 0 || i == parts => 1.0,
+        _ if i % 2 == 1 => 4.0,
+        _ => 2.0,
     };
     let step = x / parts as f64;
-    (0..=parts)
+    let sum: f64 = (0..=parts)
         .map(|i| weight(i) * density(i as f64 * step))
-        .sum::<f64>()
-        * step
-        / 3.0
+        .sum();
+    sum * step / 3.0
 }

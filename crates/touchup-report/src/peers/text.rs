@@ -1,7 +1,7 @@
 //! The chapter: one table of times and ratios, one figure, and the two promises.
 
 use super::{AGREEMENT, Peers, PeersAtSize, WANTED_FACTOR};
-use crate::{Axis, Chapter, Drawing, Figure, LineStroke, Mark, Series, Spread, Table, TableCell};
+use crate::{Axis, Chapter, Figure, Mark, Series, Spread, Table, TableCell};
 
 impl Peers {
     /// The table and its text.
@@ -39,10 +39,8 @@ fn verdicts(size: &PeersAtSize) -> Vec<String> {
         let (name, difference) = (&peer.peer, peer.largest_difference?);
         Some(format!("{name} differs from touchup's distances by up to {difference:.1e}, more than {AGREEMENT:.0e}."))
     });
-    let failed = size
-        .failed
-        .iter()
-        .map(|one| format!("{} could not be measured: {}.", one.peer, one.error));
+    let failed = size.failed.iter();
+    let failed = failed.map(|one| format!("{} could not be measured: {}.", one.peer, one.error));
     let all = pipeline
         .into_iter()
         .chain(query)
@@ -59,12 +57,10 @@ fn table(peers: &Peers) -> Table {
             .touchup
             .iter()
             .map(move |times| (size.faces, None, times));
-        ours.chain(
-            size.peers
-                .iter()
-                .map(move |times| (size.faces, Some(size.push_us()), times)),
-        )
+        let peers = size.peers.iter();
+        ours.chain(peers.map(move |times| (size.faces, Some(size.push_us()), times)))
     });
+    let batched = "closest face in one call for all (touchup: near the last), µs";
     Table::of(
         "peers",
         "Closest face and whole sample against libraries from PyPI",
@@ -79,10 +75,7 @@ fn table(peers: &Peers) -> Table {
         times.update.as_str()
     })
     .column("closest face per call, µs", |(.., times)| times.query_us)
-    .column(
-        "closest face in one call for all (touchup: near the last), µs",
-        |(.., times)| times.batched_query_us,
-    )
+    .column(batched, |(.., times)| times.batched_query_us)
     .column("whole sample, µs", |(.., times)| times.pipeline_us)
     .column("sample over touchup's push", |(_, push_us, times)| {
         Some(times.pipeline_us.median / push_us?)
@@ -90,11 +83,13 @@ fn table(peers: &Peers) -> Table {
     .column(
         "largest relative difference of a distance",
         |(_, push_us, times)| {
-            push_us.map(|_| {
+            push_us?;
+            let other = || "another question (Eq 12)".into();
+            Some(
                 times
                     .largest_difference
-                    .map_or("another question (Eq 12)".into(), TableCell::Number)
-            })
+                    .map_or_else(other, TableCell::Number),
+            )
         },
     )
     .caption("Medians with p10 to p90, one thread. A rebuild is measured over four seconds.")
@@ -106,7 +101,7 @@ fn figure(peers: &Peers) -> Figure {
         let mark = Mark::at(faces as f64, y);
         match series.iter_mut().find(|known| known.name == name) {
             Some(known) => known.marks.push(mark),
-            None => series.push(Series::new(name, LineStroke::Joined, [mark])),
+            None => series.push(Series::joined(name, [mark])),
         }
     };
     for size in &peers.sizes {
@@ -115,7 +110,7 @@ fn figure(peers: &Peers) -> Figure {
             add(&peer.peer, size.faces, peer.pipeline_us);
         }
     }
-    Figure::of("peers_sample", Drawing::Curves(series))
+    Figure::curves("peers_sample", series)
         .title("Time per sample with an index that stays exact")
         .axes(
             Axis::log("faces", "faces"),

@@ -5,6 +5,7 @@ use super::{
     Stability,
 };
 use crate::{Axis, Chapter, Drawing, Figure, Panel, Table, TableOf};
+use itertools::Itertools;
 use touchup_core::haptic::GuardParams;
 use touchup_core::haptic::dynamics::RELATIVE_ERROR;
 
@@ -43,9 +44,9 @@ fn stable_of(endings: &EndingCounts) -> String {
 }
 
 fn texts(stability: &Stability) -> Vec<String> {
-    let counts = || stability.faces.iter().map(|shares| shares.endings.runs());
-    let (runs, fewest) = (counts().max().unwrap_or(0), counts().min().unwrap_or(0));
-    let what_was_run = format!(
+    let runs = stability.faces.iter().map(|shares| shares.endings.runs());
+    let (fewest, runs) = runs.minmax().into_option().unwrap_or_default();
+    let run = format!(
         "One face and one held sample are drawn at random: h_min, f_max, alpha, beta and the step length each over twelve \
          decades, the force from a millionth of f_max to three times f_max and up to 78 degrees off the normal (what the \
          refiner lets act on a face), the tip near the face or anywhere within a metre. {runs} such runs of six steps ({fewest} \
@@ -55,32 +56,31 @@ fn texts(stability: &Stability) -> Vec<String> {
          needed is a column of its own."
     );
     let worst = stability.largest_sub_flow_error();
+    let verdict = if worst <= LARGEST_SUB_FLOW_ERROR {
+        "within"
+    } else {
+        "MISSES"
+    };
     let sub_flows = format!(
-        "The exact sub-flows differ from the 32-digit solution by {worst:.1e} of their scale at most: {} the limit of {LARGEST_SUB_FLOW_ERROR:.0e}.",
-        if worst <= LARGEST_SUB_FLOW_ERROR {
-            "within"
-        } else {
-            "MISSES"
-        }
+        "The exact sub-flows differ from the 32-digit solution by {worst:.1e} of their scale at most: {verdict} the limit of {LARGEST_SUB_FLOW_ERROR:.0e}."
     );
     let default = if stability.is_default_stable() {
         "One face: the integrator used by default (Lie, robust mode) was stable in every run."
     } else {
         "MISSED: the integrator used by default (Lie, robust mode) was not stable in every run; the tables show where."
     };
-    let runs = stability
-        .faces
-        .iter()
-        .map(of_face)
-        .chain(stability.meshes.iter().map(of_mesh));
     let verdicts = [
         sub_flows,
         of_bounded_steps(stability),
         default.to_owned(),
         of_default_on_meshes(stability),
     ];
-    std::iter::once(what_was_run)
-        .chain(runs)
+    let faces = stability.faces.iter().map(of_face);
+    let meshes = stability.meshes.iter().map(of_mesh);
+    [run]
+        .into_iter()
+        .chain(faces)
+        .chain(meshes)
         .chain(verdicts)
         .collect()
 }
@@ -92,19 +92,17 @@ fn of_bounded_steps(stability: &Stability) -> String {
         .iter()
         .map(|group| group.position.max(group.normal))
         .fold(0.0, f64::max);
+    let (cases, refused) = (sum(|group| group.cases), sum(|group| group.refused));
+    let rounded = sum(|group| group.ill_conditioned);
+    let verdict = if stability.is_bound_kept() {
+        "within"
+    } else {
+        "MISSES"
+    };
     format!(
-        "The step `bounded` solves position and normal together: on {} random stiff samples, at any angle of the force, its \
-         error is {:.2} of its bound of {RELATIVE_ERROR:.0e} at most ({} that roundings of the input move by more are compared \
-         with what those do; {} refused): {} the bound.",
-        sum(|group| group.cases),
-        largest,
-        sum(|group| group.ill_conditioned),
-        sum(|group| group.refused),
-        if stability.is_bound_kept() {
-            "within"
-        } else {
-            "MISSES"
-        }
+        "The step `bounded` solves position and normal together: on {cases} random stiff samples, at any angle of the force, its \
+         error is {largest:.2} of its bound of {RELATIVE_ERROR:.0e} at most ({rounded} that roundings of the input move by more are compared \
+         with what those do; {refused} refused): {verdict} the bound."
     )
 }
 
@@ -127,34 +125,24 @@ fn bounded_steps_table(stability: &Stability) -> Table {
 }
 
 fn of_default_on_meshes(stability: &Stability) -> String {
-    let (limit, share) = (
-        GuardParams::default().smallest_quality,
-        GuardParams::SCANNED_SHARE,
-    );
-    if stability
-        .meshes
-        .iter()
-        .all(|shares| shares.endings.stable_share() == 1.0)
-    {
+    let limit = GuardParams::default().smallest_quality;
+    let share = GuardParams::SCANNED_SHARE;
+    let endings = || stability.meshes.iter().map(|shares| &shares.endings);
+    if endings().all(|endings| endings.stable_share() == 1.0) {
         return "On meshes of any quality that was tried, the default was stable in every press."
             .to_owned();
     }
-    let sum = |of: &dyn Fn(&EndingCounts) -> usize| {
-        stability
-            .meshes
-            .iter()
-            .map(|shares| of(&shares.endings))
+    let runs: usize = endings().map(EndingCounts::runs).sum();
+    let count = |ending| {
+        endings()
+            .map(|endings| endings.count(ending))
             .sum::<usize>()
     };
-    let runs = sum(&EndingCounts::runs);
-    let [cut_back, overshot] = [RunEnding::CutBack, RunEnding::Overshot]
-        .map(|ending| sum(&|endings| endings.count(ending)));
-    let from = match stability.default_stable_from_quality() {
-        Some(quality) => {
-            format!("no press is at fault from an altitude of {quality:.2} of the longest side on")
-        }
-        None => "there are faults at every quality".to_owned(),
-    };
+    let [cut_back, overshot] = [RunEnding::CutBack, RunEnding::Overshot].map(count);
+    let from = stability.default_stable_from_quality();
+    let from = from.map_or("there are faults at every quality".to_owned(), |quality| {
+        format!("no press is at fault from an altitude of {quality:.2} of the longest side on")
+    });
     format!(
         "MISSED on bad triangles: {from}. Of {runs} presses {cut_back} were cut back, because the guard lets no triangle become \
          thinner than {limit}, or than {share} of what it was scanned with where that is less, nor turn too far or fold: the mesh \
@@ -169,31 +157,27 @@ fn of_face(shares: &FaceShares) -> String {
         Some(limit) => format!("no fault below alpha f_max dt/h_min = {limit:.0e}"),
         None => "faults in every column of the map".to_owned(),
     };
-    format!(
-        "{}: {} runs are stable; {limit}.",
-        shares.integrator,
-        stable_of(&shares.endings)
-    )
+    let (name, stable) = (shares.integrator, stable_of(&shares.endings));
+    format!("{name}: {stable} runs are stable; {limit}.")
 }
 
 fn of_mesh(shares: &MeshShares) -> String {
+    let (shape, stable) = (shares.shape, stable_of(&shares.endings));
     format!(
-        "Refiner, {}: {} presses are stable, from equilateral triangles to an altitude of a thousandth of the longest side.",
-        shares.shape,
-        stable_of(&shares.endings)
+        "Refiner, {shape}: {stable} presses are stable, from equilateral triangles to an altitude of a thousandth of the longest side."
     )
 }
 
-fn maps(panels: Vec<Panel>) -> Drawing {
+fn maps(panels: impl IntoIterator<Item = Panel>) -> Drawing {
     Drawing::Maps {
         share_of: SHARE_OF.to_owned(),
-        panels,
+        panels: panels.into_iter().collect(),
     }
 }
 
 fn stiffness_map(shares: &FaceShares) -> Figure {
     let name = shares.integrator.name();
-    Figure::of(format!("stability_{}", shares.integrator.id()), maps(shares.by_stiffness.to_vec()))
+    Figure::of(format!("stability_{}", shares.integrator.id()), maps(shares.by_stiffness.clone()))
         .title(format!("Stable runs of one face: {name}"))
         .axes(
             Axis::log("stiffness of the position, alpha f_max dt/h_min", "alpha_f_max_dt_per_h_min"),
@@ -208,7 +192,7 @@ fn stiffness_map(shares: &FaceShares) -> Figure {
 }
 
 fn step_map(faces: &[FaceShares]) -> Figure {
-    Figure::of("stability_step_length", maps(faces.iter().map(|shares| shares.by_step.clone()).collect()))
+    Figure::of("stability_step_length", maps(faces.iter().map(|shares| shares.by_step.clone())))
         .title("Stable runs of one face by step length and h_min")
         .axes(Axis::log("step length, s", "step_s"), Axis::log("h_min, m", "h_min_m"))
         .caption(
@@ -218,7 +202,7 @@ fn step_map(faces: &[FaceShares]) -> Figure {
 }
 
 fn quality_map(meshes: &[MeshShares]) -> Figure {
-    Figure::of("stability_mesh_quality", maps(meshes.iter().map(|shares| shares.by_quality.clone()).collect()))
+    Figure::of("stability_mesh_quality", maps(meshes.iter().map(|shares| shares.by_quality.clone())))
         .title("Stable presses on meshes of bad triangles")
         .axes(
             Axis::log("relaxation in one step, alpha k dt", "alpha_k_dt"),
@@ -258,31 +242,29 @@ fn meshes_table(meshes: &[MeshShares]) -> Table {
         "stability_meshes",
         "How the presses on meshes ended",
         meshes,
-    )
-    .column("triangles", |shares| shares.shape.name());
+    );
+    let table = table.column("triangles", |shares| shares.shape.name());
     with_endings(table, |shares| shares.endings)
         .caption("Robust mode, from equilateral triangles to an altitude of a thousandth of the longest side.")
 }
 
 fn sub_flows_table(stability: &Stability) -> Table {
-    Table::of(
-        "stability_sub_flows",
-        "Exact sub-flows against their implicit closed form in 32 digits",
-        &stability.sub_flows,
-    )
-    .column("sub-flow", |flow| flow.name.as_str())
-    .column("cases", |flow| flow.cases)
-    .column("largest error", |flow| flow.largest_error)
-    .column("1e-10", |flow| {
-        if flow.largest_error <= LARGEST_SUB_FLOW_ERROR {
+    let title = "Exact sub-flows against their implicit closed form in 32 digits";
+    let verdict = |error: f64| {
+        if error <= LARGEST_SUB_FLOW_ERROR {
             "within"
         } else {
             "beyond"
         }
-    })
-    .column("where", |flow| flow.worst.as_str())
-    .caption(format!(
-        "Largest error over the scale: of a position h_min and the travel, of a normal 1. Limit \
-         {LARGEST_SUB_FLOW_ERROR:.0e}. Depths up to 600 h_min, scaled times from 1e-6 to 1e6."
-    ))
+    };
+    Table::of("stability_sub_flows", title, &stability.sub_flows)
+        .column("sub-flow", |flow| flow.name.as_str())
+        .column("cases", |flow| flow.cases)
+        .column("largest error", |flow| flow.largest_error)
+        .column("1e-10", |flow| verdict(flow.largest_error))
+        .column("where", |flow| flow.worst.as_str())
+        .caption(format!(
+            "Largest error over the scale: of a position h_min and the travel, of a normal 1. Limit \
+             {LARGEST_SUB_FLOW_ERROR:.0e}. Depths up to 600 h_min, scaled times from 1e-6 to 1e6."
+        ))
 }

@@ -1,7 +1,8 @@
 //! Figures and tables of whole scans.
 
 use super::{CaseResult, MethodResult, RefineMethod, ScanResult, TouchedError, WholeScan};
-use crate::{Axis, Drawing, Figure, LineStroke, Mark, Series, Spread, Table};
+use crate::{Axis, Figure, LineStroke, Mark, Series, Spread, Table};
+use itertools::Itertools;
 use touchup_page::number::range;
 
 /// Points of a drawn law.
@@ -53,20 +54,15 @@ fn axis((label, column, _): Quantity) -> Axis {
 
 impl WholeScan {
     pub(super) fn figures(&self) -> Vec<Figure> {
-        self.cases
-            .iter()
-            .flat_map(|case| self.figures_of(case))
-            .collect()
+        let figures = self.cases.iter().flat_map(|case| self.figures_of(case));
+        figures.collect()
     }
 
     fn figures_of(&self, case: &CaseResult) -> Vec<Figure> {
-        let by_method = case
-            .main()
-            .map(|scan| BY_METHOD.map(|figure| self.by_method(case, scan, figure)));
+        let by_method = |scan| BY_METHOD.map(|figure| self.by_method(case, scan, figure));
         let over_scans = [self.regions_and_densities(case), self.error_over_edge(case)];
+        let by_method = case.main().map(by_method).into_iter().flatten();
         by_method
-            .into_iter()
-            .flatten()
             .chain(over_scans)
             .chain(self.gaussian_cost(case))
             .collect()
@@ -92,24 +88,17 @@ impl WholeScan {
             Mark::at(x.2(result, error), y.2(result, error))
         };
         let one = |result: &MethodResult| {
-            Some(Series::new(
-                &result.name,
-                LineStroke::Marks,
-                [mark(result, &result.error?)],
-            ))
+            let marks = [mark(result, &result.error?)];
+            Some(Series::new(&result.name, LineStroke::Marks, marks))
         };
-        let mut series: Vec<Series> = scan.methods.iter().filter_map(one).collect();
-        let xs = range(
-            series
-                .iter()
-                .flat_map(|series| &series.marks)
-                .map(|mark| mark.x.median),
-        );
+        let mut series = scan.methods.iter().filter_map(one).collect_vec();
+        let marks = series.iter().flat_map(|series| &series.marks);
+        let xs = range(marks.map(|mark| mark.x.median));
         series.extend(xs.zip(scan.methods.first()).map(|((low, high), any)| {
             let at = |x: f64| Mark::at(x, y.2(any, &scan.before));
-            Series::new("unrefined scan", LineStroke::Dashed, [low, high].map(at))
+            Series::dashed("unrefined scan", [low, high].map(at))
         }));
-        Figure::of(format!("whole_scan_{id}_{}", file_name(&case.name)), Drawing::Curves(series))
+        Figure::curves(format!("whole_scan_{id}_{}", file_name(&case.name)), series)
             .title(format!("{title}, {}", case.name))
             .axes(axis(x), axis(y))
             .caption(format!(
@@ -123,39 +112,32 @@ impl WholeScan {
     fn regions_and_densities(&self, case: &CaseResult) -> Figure {
         let mark =
             |result: &MethodResult| Some(Mark::at(result.per_sample_us, result.error?.mean_mm()));
-        let mut series = Vec::new();
-        if let Some(scan) = case.main() {
-            let robust = scan
-                .methods
-                .iter()
-                .filter(|result| matches!(result.method, RefineMethod::Robust(_)));
+        let scans = by_edge(case);
+        let edges = scans
+            .iter()
+            .map(|scan| format!("{:.1}", scan.edge_mm))
+            .join(", ");
+        let regions = case.main().map(|scan| {
+            let is_robust =
+                |result: &&MethodResult| matches!(result.method, RefineMethod::Robust(_));
+            let robust = scan.methods.iter().filter(is_robust);
             let name = "robust: handle, one ring, 0.5, 1, 2 tip radii";
-            series.push(Series::new(
-                name,
-                LineStroke::Joined,
-                robust.filter_map(mark),
-            ));
-        }
-        for method in RefineMethod::BY_DENSITY
+            Series::joined(name, robust.filter_map(mark))
+        });
+        let methods = RefineMethod::BY_DENSITY
             .into_iter()
-            .filter(|_| case.scans.len() > 1)
-        {
-            let scans = by_edge(case);
-            let edges: Vec<String> = scans
-                .iter()
-                .map(|scan| format!("{:.1}", scan.edge_mm))
-                .collect();
-            let name = format!("{}: edges of {} mm", method.name(), edges.join(", "));
-            let marks = scans.into_iter().filter_map(|scan| mark(scan.of(method)?));
-            series.push(Series::new(name, LineStroke::Joined, marks));
-        }
-        Figure::of(
-            format!("whole_scan_regions_{}", file_name(&case.name)),
-            Drawing::Curves(series),
+            .filter(|_| case.scans.len() > 1);
+        let densities = methods.map(|method| {
+            let marks = scans.iter().filter_map(|scan| mark(scan.of(method)?));
+            Series::joined(format!("{}: edges of {edges} mm", method.name()), marks)
+        });
+        let (id, name) = (file_name(&case.name), &case.name);
+        Figure::curves(
+            format!("whole_scan_regions_{id}"),
+            regions.into_iter().chain(densities),
         )
         .title(format!(
-            "Mean surface error over region sizes and mesh densities, {}",
-            case.name
+            "Mean surface error over region sizes and mesh densities, {name}"
         ))
         .axes(axis(PER_SAMPLE), axis(MEAN))
         .caption(format!(
@@ -166,19 +148,16 @@ impl WholeScan {
 
     fn error_over_edge(&self, case: &CaseResult) -> Figure {
         let scans = by_edge(case);
-        let mark =
-            |scan: &ScanResult, error: &TouchedError| Mark::at(scan.edge_mm, error.mean_mm());
+        let mark = |scan: &ScanResult, error: TouchedError| Mark::at(scan.edge_mm, error.mean_mm());
         let methods = RefineMethod::BY_DENSITY.into_iter().map(|method| {
             let marks = scans
                 .iter()
-                .filter_map(|scan| Some(mark(scan, &scan.of(method)?.error?)));
-            Series::new(method.name(), LineStroke::Joined, marks)
+                .filter_map(|scan| Some(mark(scan, scan.of(method)?.error?)));
+            Series::joined(method.name(), marks)
         });
-        let before = scans.iter().map(|scan| mark(scan, &scan.before));
-        let all = methods
-            .chain([Series::new("unrefined scan", LineStroke::Dashed, before)])
-            .collect();
-        Figure::of(format!("whole_scan_density_{}", file_name(&case.name)), Drawing::Curves(all))
+        let before = scans.iter().map(|scan| mark(scan, scan.before));
+        let all = methods.chain([Series::dashed("unrefined scan", before)]);
+        Figure::curves(format!("whole_scan_density_{}", file_name(&case.name)), all)
             .title(format!("Mean surface error over the density of the scan, {}", case.name))
             .axes(Axis::log("mean edge of the scan, mm", "edge_mm"), axis(MEAN))
             .caption("The same samples on scans with shorter and longer edges. The errors are the same in every run.")
@@ -197,20 +176,20 @@ impl WholeScan {
             .map(|&(count, time)| Mark::at(count, time));
         let law = (0..=STEPS).map(step).map(|n| Mark::at(n, at(n)));
         let law_name = format!("extrapolated, n^{:.2}", cost.exponent);
-        let mut series = vec![
-            Series::new("Gaussian process, refitted", LineStroke::Joined, measured),
-            Series::new(law_name, LineStroke::Dashed, law),
-        ];
         let first = cost.marks.first().map_or(1.0, |mark| mark.0);
-        for method in [RefineMethod::HAPTIC, RefineMethod::Patch] {
-            let Some(result) = case.main().and_then(|scan| scan.of(method)) else {
-                continue;
-            };
-            let marks = [first, contacts].map(|n| Mark::at(n, result.per_sample_us.median));
-            series.push(Series::new(method.name(), LineStroke::Dashed, marks));
-        }
+        let others = [RefineMethod::HAPTIC, RefineMethod::Patch]
+            .into_iter()
+            .filter_map(|method| {
+                let result = case.main()?.of(method)?;
+                let marks = [first, contacts].map(|n| Mark::at(n, result.per_sample_us.median));
+                Some(Series::dashed(method.name(), marks))
+            });
+        let series = [
+            Series::joined("Gaussian process, refitted", measured),
+            Series::dashed(law_name, law),
+        ];
         Some(
-            Figure::of(format!("whole_scan_gaussian_{}", file_name(&case.name)), Drawing::Curves(series))
+            Figure::curves(format!("whole_scan_gaussian_{}", file_name(&case.name)), series.into_iter().chain(others))
                 .title(format!("Time for one more touch over the touches kept, {}", case.name))
                 .axes(
                     Axis::log("touches kept", "touches"),
@@ -230,10 +209,8 @@ impl WholeScan {
             .iter()
             .flat_map(|case| case.scans.iter().map(move |scan| (case, scan)));
         let rows = scans.flat_map(|(case, scan)| {
-            let results = scan.methods.iter().map(Some);
-            std::iter::once(None)
-                .chain(results)
-                .map(move |result| (case, scan, result))
+            let results = std::iter::once(None).chain(scan.methods.iter().map(Some));
+            results.map(move |result| (case, scan, result))
         });
         type Row<'a> = (&'a CaseResult, &'a ScanResult, Option<&'a MethodResult>);
         // without a method: the scan as it came
@@ -267,20 +244,20 @@ impl WholeScan {
 
 /// The scans of a case, the finest first.
 pub(super) fn by_edge(case: &CaseResult) -> Vec<&ScanResult> {
-    let mut scans: Vec<&ScanResult> = case.scans.iter().collect();
-    scans.sort_by(|a, b| a.edge_mm.total_cmp(&b.edge_mm));
+    let scans = case.scans.iter();
     scans
+        .sorted_by(|a, b| a.edge_mm.total_cmp(&b.edge_mm))
+        .collect()
 }
 
 /// A name with the characters of a file name.
 fn file_name(name: &str) -> String {
-    name.chars()
-        .map(|c| {
-            if c.is_ascii_alphanumeric() {
-                c.to_ascii_lowercase()
-            } else {
-                '_'
-            }
-        })
-        .collect()
+    let letter = |c: char| {
+        if c.is_ascii_alphanumeric() {
+            c.to_ascii_lowercase()
+        } else {
+            '_'
+        }
+    };
+    name.chars().map(letter).collect()
 }

@@ -3,6 +3,7 @@
 use super::figures::by_edge;
 use super::{CaseResult, GaussianCost, MethodResult, Reach, RefineMethod, ScanResult, WholeScan};
 use crate::Chapter;
+use itertools::Itertools;
 
 /// A difference below this share is none.
 const ALIKE: f64 = 0.02;
@@ -61,31 +62,30 @@ impl CaseResult {
             ..
         } = scan;
         let [mean, p95, normals] = [before.mean_mm(), before.p95_mm(), before.normal_mean_deg];
-        let best = scan
+        let mut text = format!(
+            "{name}: {faces} faces with edges of {edge_mm:.1} mm, {samples} samples in {duration_s:.0} s of touching; the \
+             unrefined scan is off by {mean:.3} mm (p95 {p95:.3} mm, normals {normals:.1} deg)."
+        );
+        text += &scan
             .best()
             .map_or(" No method reduced the error.".to_owned(), |best| {
                 let (best, times) = (describe(best), mean / best.mean_mm());
                 format!(" The least mean error has {best}: {times:.1} times less than the scan.")
             });
-        let front: Vec<String> = scan.front().into_iter().map(describe).collect();
-        let front = (front.len() > 1).then(|| {
-            format!(
-                " No other method is both faster and more accurate than one of these: {}.",
-                front.join(", ")
-            )
-        });
-        let haptic = scan.best_haptic().map(|haptic| {
-            let (best, regions) = (describe(haptic), same_regions(scan));
-            let points = against_contact_points(haptic, scan.of(RefineMethod::ContactPoints));
-            format!(
-                " Of the regions of the haptic update alone the best is {best}.{regions}{points}"
-            )
-        });
-        let (front, haptic) = (front.unwrap_or_default(), haptic.unwrap_or_default());
-        format!(
-            "{name}: {faces} faces with edges of {edge_mm:.1} mm, {samples} samples in {duration_s:.0} s of touching; the \
-             unrefined scan is off by {mean:.3} mm (p95 {p95:.3} mm, normals {normals:.1} deg).{best}{front}{haptic}"
-        )
+        let front = scan.front();
+        if front.len() > 1 {
+            let front = front.into_iter().map(describe).join(", ");
+            text += &format!(
+                " No other method is both faster and more accurate than one of these: {front}."
+            );
+        }
+        if let Some(haptic) = scan.best_haptic() {
+            let best = describe(haptic);
+            text += &format!(" Of the regions of the haptic update alone the best is {best}.");
+            text += &same_regions(scan);
+            text += &against_contact_points(haptic, scan.of(RefineMethod::ContactPoints));
+        }
+        text
     }
 
     /// What finer and coarser scans change.
@@ -93,19 +93,19 @@ impl CaseResult {
         let text = |method: RefineMethod| {
             let each = |scan: &ScanResult| {
                 let result = scan.of(method)?;
-                let (mm, us, edge_mm) =
-                    (result.mean_mm(), result.per_sample_us.median, scan.edge_mm);
+                let (mm, us) = (result.mean_mm(), result.per_sample_us.median);
                 let worse = if result.is_worse {
                     ", worse than the scan"
                 } else {
                     ""
                 };
                 Some(format!(
-                    "{mm:.3} mm in {us:.2} µs per sample at {edge_mm:.1} mm{worse}"
+                    "{mm:.3} mm in {us:.2} µs per sample at {:.1} mm{worse}",
+                    scan.edge_mm
                 ))
             };
-            let all: Vec<String> = by_edge(self).into_iter().rev().filter_map(each).collect();
-            format!("{}: {}", method.name(), all.join(", "))
+            let all = by_edge(self).into_iter().rev().filter_map(each).join(", ");
+            format!("{}: {all}", method.name())
         };
         let all = RefineMethod::BY_DENSITY.map(text).join("; ");
         (self.scans.len() > 1)
@@ -117,17 +117,16 @@ impl CaseResult {
             marks,
             exponent,
             contacts,
-            at_all_contacts_us,
+            ..
         } = cost;
-        let (count, time) = marks
-            .last()
-            .map_or((0.0, 0.0), |(count, time)| (*count, time.median));
+        let last = marks.last().map(|(count, time)| (*count, time.median));
+        let (count, time) = last.unwrap_or_default();
         format!(
             "{}: one more touch costs the Gaussian process {:.2} ms at {count:.0} touches, and that grows as n^{exponent:.2}. \
              With all {contacts} contacts it would be {} for each touch by the same law.",
             self.name,
             time * 1e-3,
-            long_time(at_all_contacts_us * 1e-6)
+            long_time(cost.at_all_contacts_us * 1e-6)
         )
     }
 }
@@ -148,20 +147,16 @@ fn against_contact_points(haptic: &MethodResult, points: Option<&MethodResult>) 
         return String::new();
     };
     if !points.is_sound() {
-        return format!(
-            " Contact points alone did not do: {}.",
-            points.remarks.join("; ")
-        );
+        let remarks = points.remarks.join("; ");
+        return format!(" Contact points alone did not do: {remarks}.");
     }
     let share = haptic.mean_mm() / points.mean_mm();
     let normals = haptic
         .error
         .zip(points.error)
-        .map_or_else(String::new, |(haptic, points)| {
-            format!(
-                "; normals {:.1} against {:.1} deg",
-                haptic.normal_mean_deg, points.normal_mean_deg
-            )
+        .map_or(String::new(), |(haptic, points)| {
+            let [haptic, points] = [haptic, points].map(|error| error.normal_mean_deg);
+            format!("; normals {haptic:.1} against {points:.1} deg")
         });
     let verdict = match share {
         _ if (share - 1.0).abs() < ALIKE => "is as good as",
@@ -183,25 +178,25 @@ fn same_regions(scan: &ScanResult) -> String {
     };
     let is_same =
         |result: &&MethodResult| result.method != handle.method && result.error == handle.error;
-    let same: Vec<&str> = scan
+    let same = scan
         .methods
         .iter()
         .filter(is_same)
-        .map(|result| result.name.as_str())
-        .collect();
-    let text = format!(
-        " With edges of {:.1} mm nothing but the handle moves with: {}.",
-        scan.edge_mm,
-        same.join(", ")
-    );
-    if same.is_empty() { String::new() } else { text }
+        .map(|result| &result.name)
+        .join(", ");
+    if same.is_empty() {
+        return same;
+    }
+    format!(
+        " With edges of {:.1} mm nothing but the handle moves with: {same}.",
+        scan.edge_mm
+    )
 }
 
 /// Methods that stopped early or made the scan worse.
 fn failures(scan: &ScanResult) -> Option<String> {
     let failed = scan.methods.iter().filter(|result| !result.is_sound());
-    let failed: Vec<String> = failed
-        .map(|result| format!("{}: {}", result.name, result.remarks.join("; ")))
-        .collect();
-    (!failed.is_empty()).then(|| format!("What did not do: {}.", failed.join(". ")))
+    let mut failed = failed.map(|result| format!("{}: {}", result.name, result.remarks.join("; ")));
+    let failed = failed.join(". ");
+    (!failed.is_empty()).then(|| format!("What did not do: {failed}."))
 }

@@ -1,37 +1,41 @@
 //! The results as a chapter, with its text.
 
-use super::{Curve, FaceCase, IntegratorRun, Method, PAPER_H_MIN_M, TILTS_DEG, WorkPrecision};
-use crate::{Axis, Chapter, Drawing, Figure, LineStroke, Mark, Series, Spread, Table};
+use super::{FaceCase, IntegratorRun, Method, PAPER_H_MIN_M, TILTS_DEG, WorkPrecision};
+use crate::{Axis, Chapter, Figure, Mark, Series, Spread, Table};
+use itertools::Itertools;
 use touchup_page::number::{range, three_digits};
 
 /// Requested accuracy, m: the resolution of a sensor, a thousandth of that, and as good as exact.
 const LEVELS_M: [(f64, &str); 3] = [(1e-6, "1 µm"), (1e-9, "1 nm"), (1e-12, "1 pm")];
 /// Stiffnesses with figures of their own.
 const SHOWN_H_MINS_M: [f64; 2] = [PAPER_H_MIN_M, 1e-9];
+/// Methods that may do a whole sample in one step.
+const EXACT: [Method; 2] = [Method::Lie, Method::DriftCorrected];
 
 impl WorkPrecision {
     /// Chapter 1 of the report.
     pub fn chapter(&self) -> Chapter {
-        let shown = self
-            .cases
-            .iter()
-            .filter(|case| SHOWN_H_MINS_M.contains(&case.h_min_m));
+        let is_shown = |case: &&FaceCase| SHOWN_H_MINS_M.contains(&case.h_min_m);
+        let shown = self.cases.iter().filter(is_shown);
         let figures = shown.flat_map(|case| self.error_figures(case));
-        let figures = figures
-            .chain(TILTS_DEG.map(|tilt| self.stiffness_figure(tilt)))
-            .collect();
+        let figures = figures.chain(TILTS_DEG.map(|tilt| self.stiffness_figure(tilt)));
         let tables = vec![self.ranking_table(), self.one_step_table()];
-        Chapter::of("Work-precision of one face", self.text(), figures, tables)
+        Chapter::of(
+            "Work-precision of one face",
+            self.text(),
+            figures.collect(),
+            tables,
+        )
     }
 
     /// What a practitioner should take from it.
     pub fn verdict(&self) -> Vec<String> {
-        let steps = [Method::Lie, Method::DriftCorrected]
-            .into_iter()
-            .filter_map(|method| self.worst_step(method));
+        let steps = EXACT
+            .iter()
+            .filter_map(|method| self.worst_step(*method))
+            .join(" ");
         vec![format!(
-            "Integrator. {} {}",
-            steps.collect::<Vec<_>>().join(" "),
+            "Integrator. {steps} {}",
             self.wins_and_losses(LEVELS_M[0])
         )]
     }
@@ -50,167 +54,130 @@ impl WorkPrecision {
         let solvers = "The implicit solver is RODAS 4(3), L-stable, written for this report: the crate diffsol would bring a \
                        hundred more crates along for four unknowns. Every integrator gets the same right-hand side and the \
                        same compiler.";
-        let mut text = vec![setting, solvers.to_owned()];
-        text.extend(
-            [Method::Lie, Method::DriftCorrected]
-                .into_iter()
-                .filter_map(|method| self.worst_step(method)),
-        );
-        text.extend(LEVELS_M.map(|level| self.wins_and_losses(level)));
-        text.extend(self.explicit_limits());
-        text.extend(self.flow_cost());
         let missing = self.without_reference.iter();
-        text.extend(
-            missing.map(|name| format!("No reference was found for {name}: not measured.")),
-        );
-        text
+        let missing =
+            missing.map(|name| format!("No reference was found for {name}: not measured."));
+        [setting, solvers.to_owned()]
+            .into_iter()
+            .chain(EXACT.iter().filter_map(|method| self.worst_step(*method)))
+            .chain(LEVELS_M.map(|level| self.wins_and_losses(level)))
+            .chain(self.explicit_limits())
+            .chain(self.flow_cost())
+            .chain(missing)
+            .collect()
     }
 
     /// Time and largest error of a single step over all cases, with and without tilt.
     fn worst_step(&self, method: Method) -> Option<String> {
-        let steps = self
-            .cases
-            .iter()
-            .filter_map(|case| Some((case, *case.curve(method)?.one_step()?)));
-        let steps: Vec<(&FaceCase, IntegratorRun)> = steps.collect();
-        let slowest = steps
-            .iter()
-            .max_by(|a, b| a.1.time_s.median.total_cmp(&b.1.time_s.median))?;
+        let step = |case| Some((case, *FaceCase::curve(case, method)?.one_step()?));
+        let steps = self.cases.iter().filter_map(step).collect_vec();
+        let slowest = steps.iter().map(|(_, run)| run.time_s);
+        let slowest = time(slowest.max_by(|a, b| a.median.total_cmp(&b.median))?);
         let [straight, tilted] = TILTS_DEG.map(|tilt| {
-            let tilted = steps.iter().filter(move |(case, _)| case.tilt_deg == tilt);
+            let tilted = steps.iter().filter(|(case, _)| case.tilt_deg == tilt);
             tilted.max_by(|a, b| a.1.error_m.total_cmp(&b.1.error_m))
         });
         let ((straight_case, straight), (case, tilted)) = (straight?, tilted?);
         let without_friction = if straight.error_m <= straight_case.floor_m {
-            "without friction it is as exact as the reference can resolve, whatever h_min"
-                .to_owned()
+            "is as exact as the reference can resolve, whatever h_min".to_owned()
         } else {
-            format!(
-                "without friction it is off by at most {}",
-                length(straight.error_m)
-            )
+            format!("is off by at most {}", length(straight.error_m))
         };
-        let (name, slowest, tilt) = (method.name(), time(slowest.1.time_s), TILTS_DEG[1]);
+        let (name, tilt) = (method.name(), TILTS_DEG[1]);
         let [most, h_min] = [tilted.error_m, case.h_min_m].map(length);
         Some(format!(
-            "One step \"{name}\" over the whole sample takes at most {slowest}; {without_friction}; with the force tilted by \
-             {tilt}° it is off by at most {most} (at h_min {h_min})."
+            "One step \"{name}\" over the whole sample takes at most {slowest}; without friction it {without_friction}; \
+             with the force tilted by {tilt}° it is off by at most {most} (at h_min {h_min})."
         ))
     }
 
     /// The fastest integrator for an error: where it is an exact step, and where not, by how much.
     fn wins_and_losses(&self, (error_m, name): (f64, &str)) -> String {
-        let outcomes: Vec<FastestSolvers> = self
+        let outcomes = self
             .cases
             .iter()
-            .map(|case| FastestSolvers::of(case, error_m))
-            .collect();
-        let (won, others): (Vec<_>, Vec<_>) = outcomes.iter().partition(|outcome| outcome.is_won());
+            .map(|case| FastestSolvers::of(case, error_m));
+        let (won, others): (Vec<_>, Vec<_>) = outcomes.partition(FastestSolvers::is_won);
+        let (won_count, all) = (won.len(), self.cases.len());
         let (lost, unreached): (Vec<_>, Vec<_>) = others
             .into_iter()
             .partition(|outcome| outcome.other.is_some());
-        let faster =
-            range(won.iter().filter_map(|outcome| outcome.factor())).map(|(least, most)| {
-                let [least, most] = [least, most].map(three_digits);
-                format!(
-                    ", {least} to {most} times as fast as the best solver ({})",
-                    h_mins(&won)
-                )
-            });
-        let alone = where_any(
-            won.iter().filter(|outcome| outcome.other.is_none()).count(),
-            |alone| format!("; in {alone} of them nothing else gets there"),
-        );
-        let mut names: Vec<&str> = lost
+        let faster = range(won.iter().filter_map(FastestSolvers::factor));
+        let faster = faster.map_or(String::new(), |(least, most)| {
+            let ([least, most], h_mins) = ([least, most].map(three_digits), h_mins(&won));
+            format!(", {least} to {most} times as fast as the best solver ({h_mins})")
+        });
+        let alone = won.iter().filter(|outcome| outcome.other.is_none()).count();
+        let alone = where_any(alone, |alone| {
+            format!("; in {alone} of them nothing else gets there")
+        });
+        let names = lost
             .iter()
-            .filter_map(|outcome| Some(outcome.other?.0.name()))
-            .collect();
-        names.sort_unstable();
-        names.dedup();
+            .filter_map(|outcome| Some(outcome.other?.0.name()));
+        let names = names.sorted_unstable().dedup().join(" or ");
         let slower = range(
             lost.iter()
                 .filter_map(|outcome| Some(1.0 / outcome.factor()?)),
         );
-        let slower = slower
-            .map(|(_, most)| format!(", by at most {} times", three_digits(most)))
-            .unwrap_or_default();
-        let never = where_any(
-            lost.iter()
-                .filter(|outcome| outcome.exact.is_none())
-                .count(),
-            |never| format!("; in {never} of them no exact step gets there"),
-        );
+        let slower = slower.map_or(String::new(), |(_, most)| {
+            format!(", by at most {} times", three_digits(most))
+        });
+        let never = lost
+            .iter()
+            .filter(|outcome| outcome.exact.is_none())
+            .count();
+        let never = where_any(never, |never| {
+            format!("; in {never} of them no exact step gets there")
+        });
         let losses = where_any(lost.len(), |count| {
             format!(
-                " In {count} it is not ({}): {} wins{slower}{never}.",
-                h_mins(&lost),
-                names.join(" or ")
+                " In {count} it is not ({}): {names} wins{slower}{never}.",
+                h_mins(&lost)
             )
         });
         let nothing = where_any(unreached.len(), |count| {
             format!(" In {count} nothing gets there.")
         });
         format!(
-            "To be within {name}, an exact step is the fastest in {} of {} cases{}{alone}.{losses}{nothing}",
-            won.len(),
-            outcomes.len(),
-            faster.unwrap_or_default()
+            "To be within {name}, an exact step is the fastest in {won_count} of {all} cases{faster}{alone}.{losses}{nothing}"
         )
     }
 
     /// Up to which stiffness the explicit solvers are of use.
-    fn explicit_limits(&self) -> Vec<String> {
-        let explicit = [Method::Euler, Method::RungeKutta, Method::DormandPrince];
+    fn explicit_limits(&self) -> Option<String> {
         let fastest = |method: Method, error_m: f64| {
-            let fails = |case: &&FaceCase| {
-                case.curve(method)
-                    .is_none_or(|curve| curve.cheapest(error_m).is_none())
-            };
-            let failing: Vec<f64> = self
-                .cases
-                .iter()
-                .filter(fails)
-                .map(|case| case.h_min_m)
-                .collect();
+            let reaches = |case: &FaceCase| case.curve(method)?.cheapest(error_m).map(|_| ());
+            let failing = self.cases.iter().filter(|case| reaches(case).is_none());
+            let failing = failing.map(|case| case.h_min_m).collect_vec();
             let (name, count) = (method.name(), failing.len());
-            range(failing).map_or_else(
-                || format!("{name} gets there everywhere"),
-                |(_, mildest)| {
-                    format!(
-                        "{name} misses {count} cases, the mildest at h_min {}",
-                        length(mildest)
-                    )
-                },
-            )
+            range(failing).map_or(format!("{name} gets there everywhere"), |(_, mildest)| {
+                format!(
+                    "{name} misses {count} cases, the mildest at h_min {}",
+                    length(mildest)
+                )
+            })
         };
-        let levels = LEVELS_M[..2].iter();
-        let lines = levels.map(|(error_m, name)| {
+        let mut lines = LEVELS_M[..2].iter().map(|(error_m, name)| {
+            let explicit = [Method::Euler, Method::RungeKutta, Method::DormandPrince];
             format!(
-                "{}: {}",
-                name,
-                explicit.map(|m| fastest(m, *error_m)).join(", ")
+                "{name}: {}",
+                explicit.map(|method| fastest(method, *error_m)).join(", ")
             )
         });
-        let first = self
-            .cases
-            .iter()
-            .filter_map(|case| case.curve(Method::Euler)?.points.last());
-        let Some(steps) = first.map(|point| point.evaluations).max() else {
-            return Vec::new();
-        };
-        vec![format!(
+        let last = |case: &FaceCase| Some(case.curve(Method::Euler)?.points.last()?.evaluations);
+        let steps = self.cases.iter().filter_map(last).max()?;
+        Some(format!(
             "Explicit solvers, with up to {steps} steps a sample. Within {}. The expected force is bounded, so \
              steps that are too coarse do not run away: they rattle around the answer.",
-            lines.collect::<Vec<_>>().join(". Within ")
-        )]
+            lines.join(". Within ")
+        ))
     }
 
     /// What a flow costs in evaluations.
     fn flow_cost(&self) -> Option<String> {
-        let case = self
-            .cases
-            .iter()
-            .find(|case| case.h_min_m == PAPER_H_MIN_M && case.tilt_deg == TILTS_DEG[1])?;
+        let is_meant =
+            |case: &&FaceCase| case.h_min_m == PAPER_H_MIN_M && case.tilt_deg == TILTS_DEG[1];
+        let case = self.cases.iter().find(is_meant)?;
         let per_count = |method| {
             let last = case.curve(method)?.points.last()?;
             Some(last.time_s.times(1.0 / last.evaluations as f64))
@@ -233,15 +200,12 @@ impl WorkPrecision {
         );
         let time = Axis::log("time for the sample, µs", "time_us");
         let counted = "The same runs by what is counted instead of timed: no spread, the counts repeat exactly.";
-        let evaluations = Axis::log(
-            "evaluations of the right-hand side, or exact flows",
-            "evaluations",
-        );
+        let label = "evaluations of the right-hand side, or exact flows";
+        let evaluations = Axis::log(label, "evaluations");
+        let count = |point: &IntegratorRun| (point.evaluations as f64).into();
         [
             case.figure("time", &caption, time, |point| point.time_s.times(1e6)),
-            case.figure("evaluations", counted, evaluations, |point| {
-                (point.evaluations as f64).into()
-            }),
+            case.figure("evaluations", counted, evaluations, count),
         ]
     }
 
@@ -254,10 +218,11 @@ impl WorkPrecision {
                 let point = case.curve(method)?.cheapest(error_m)?;
                 Some(Mark::at(1e3 * case.h_min_m, point.time_s.times(1e6)))
             });
-            Series::new(method.name(), LineStroke::Joined, marks)
+            Series::joined(method.name(), marks)
         });
-        Figure::of(format!("work_precision_stiffness_{}", force_id(tilt_deg)), Drawing::Curves(series.to_vec()))
-            .title(format!("Time to be within {name}, {}", force_name(tilt_deg)))
+        let (id, force) = force(tilt_deg);
+        Figure::curves(format!("work_precision_stiffness_{id}"), series)
+            .title(format!("Time to be within {name}, {force}"))
             .axes(Axis::log("h_min, mm", "h_min_mm"), Axis::log("time for the sample, µs", "time_us"))
             .caption(format!(
                 "The cheapest setting from which on every finer one is within {name} too; a curve ends where there is \
@@ -269,7 +234,7 @@ impl WorkPrecision {
     fn ranking_table(&self) -> Table {
         let at_levels =
             |case| LEVELS_M.map(|(error_m, name)| (case, name, FaceCase::ranking(case, error_m)));
-        let rankings: Vec<_> = self.cases.iter().flat_map(at_levels).collect();
+        let rankings = self.cases.iter().flat_map(at_levels).collect_vec();
         let table = Table::of(
             "work_precision_fastest",
             "Fastest integrator for an error",
@@ -299,11 +264,8 @@ impl WorkPrecision {
         .column("h_min, mm", |case| 1e3 * case.h_min_m)
         .column("tilt, °", |case| case.tilt_deg)
         .column("travel, mm", |case| 1e3 * case.travel_m);
-        let methods = [
-            ("Lie", Method::Lie),
-            ("drift-corrected", Method::DriftCorrected),
-        ];
-        let steps = methods.into_iter().fold(table, |table, (name, method)| {
+        let methods = ["Lie", "drift-corrected"].into_iter().zip(EXACT);
+        let steps = methods.fold(table, |table, (name, method)| {
             let step = |case: &FaceCase| case.curve(method)?.one_step().copied();
             table
                 .column(format!("{name}: error, mm"), |case| {
@@ -333,10 +295,8 @@ impl FastestSolvers {
     fn of(case: &FaceCase, error_m: f64) -> Self {
         let ranking = case.ranking(error_m);
         let first = |is_exact| {
-            ranking
-                .iter()
-                .find(|(method, _)| method.is_exact() == is_exact)
-                .copied()
+            let mut solvers = ranking.iter().copied();
+            solvers.find(|(method, _)| method.is_exact() == is_exact)
         };
         Self {
             h_min_m: case.h_min_m,
@@ -365,7 +325,7 @@ fn where_any(count: usize, text: impl Fn(usize) -> String) -> String {
 }
 
 /// "h_min 1 nm to 1 µm".
-fn h_mins(outcomes: &[&FastestSolvers]) -> String {
+fn h_mins(outcomes: &[FastestSolvers]) -> String {
     match range(outcomes.iter().map(|outcome| outcome.h_min_m)) {
         Some((low, high)) if low < high => format!("h_min {} to {}", length(low), length(high)),
         Some((low, _)) => format!("h_min {}", length(low)),
@@ -376,16 +336,15 @@ fn h_mins(outcomes: &[&FastestSolvers]) -> String {
 /// In the unit that leaves few zeros.
 fn length(metres: f64) -> String {
     let units = [(1e-3, "mm"), (1e-6, "µm"), (1e-9, "nm"), (1e-12, "pm")];
-    let (unit, name) = units
-        .into_iter()
-        .find(|(unit, _)| metres >= 0.1 * unit)
-        .unwrap_or((1e-12, "pm"));
+    let fitting = units.into_iter().find(|(unit, _)| metres >= 0.1 * unit);
+    let (unit, name) = fitting.unwrap_or(units[3]);
     format!("{} {name}", three_digits(metres / unit))
 }
 
 /// Median and ends, in the unit that leaves few zeros.
 fn time(seconds: Spread) -> String {
-    let (unit, name) = if seconds.median < 1e-7 {
+    let is_short = seconds.median < 1e-7;
+    let (unit, name) = if is_short {
         (1e-9, "ns")
     } else {
         (1e-6, "µs")
@@ -403,19 +362,14 @@ impl FaceCase {
         x: fn(&IntegratorRun) -> Spread,
     ) -> Figure {
         let series = self.curves.iter().map(|curve| {
-            let marks = curve
-                .points
-                .iter()
-                .map(|point| Mark::at(x(point), 1e3 * point.error_m));
-            Series::new(curve.method.name(), LineStroke::Joined, marks)
+            let mark = |point: &IntegratorRun| Mark::at(x(point), 1e3 * point.error_m);
+            Series::joined(curve.method.name(), curve.points.iter().map(mark))
         });
-        let (exponent, tilt_deg) = ((self.h_min_m * 1e9).round(), self.tilt_deg);
-        let id = format!("work_precision_{over}_{exponent}nm_{}", force_id(tilt_deg));
-        Figure::of(id, Drawing::Curves(series.collect()))
+        let (id, force) = force(self.tilt_deg);
+        let (nm, h_min) = ((self.h_min_m * 1e9).round(), length(self.h_min_m));
+        Figure::curves(format!("work_precision_{over}_{nm}nm_{id}"), series)
             .title(format!(
-                "Error at the end of one sample: h_min {}, {}",
-                length(self.h_min_m),
-                force_name(tilt_deg)
+                "Error at the end of one sample: h_min {h_min}, {force}"
             ))
             .axes(axis, Axis::log("error of the barycentre, mm", "error_mm"))
             .caption(format!("{caption}{}", self.gave_up()))
@@ -424,31 +378,26 @@ impl FaceCase {
     /// Which integrators gave up, and how often; empty where none did.
     fn gave_up(&self) -> String {
         let giving_up = self.curves.iter().filter(|curve| curve.gave_up > 0);
-        let failure = |curve: &Curve| {
-            let all = curve.gave_up + curve.points.len();
+        let failures = giving_up.map(|curve| {
+            let (name, gave_up) = (curve.method.name(), curve.gave_up);
             format!(
-                "{} gave up at {} of {all} settings",
-                curve.method.name(),
-                curve.gave_up
+                "{name} gave up at {gave_up} of {} settings",
+                gave_up + curve.points.len()
             )
-        };
-        let failures: Vec<String> = giving_up.map(failure).collect();
+        });
+        let failures = failures.collect_vec();
         where_any(failures.len(), |_| format!(" {}.", failures.join("; ")))
     }
 }
 
-fn force_name(tilt_deg: f64) -> String {
+/// A force in the name of a file, and in words.
+fn force(tilt_deg: f64) -> (&'static str, String) {
     if tilt_deg == 0.0 {
-        "no friction".to_owned()
+        ("straight", "no friction".to_owned())
     } else {
-        format!("force tilted by {}°", three_digits(tilt_deg))
-    }
-}
-
-fn force_id(tilt_deg: f64) -> &'static str {
-    if tilt_deg == 0.0 {
-        "straight"
-    } else {
-        "tilted"
+        (
+            "tilted",
+            format!("force tilted by {}°", three_digits(tilt_deg)),
+        )
     }
 }
