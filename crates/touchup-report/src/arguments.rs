@@ -9,6 +9,7 @@ use std::time::{Instant, SystemTime};
 
 use chrono::{DateTime, Utc};
 use clap::{Parser, ValueEnum};
+use itertools::Itertools;
 
 use touchup_io::atomic::{create_folder, write_atomically};
 use touchup_io::machine::{COMMIT, VERSION, describe_machine};
@@ -203,22 +204,15 @@ pub fn report(arguments: &ReportArguments) -> Result<(), CommandError> {
 
 /// "question: use this. Because …; cost …".
 fn advice_line(row: &[TableCell]) -> String {
-    let texts = row.iter().filter_map(|cell| {
-        if let TableCell::Text(text) = cell {
-            Some(text.as_str())
-        } else {
-            None
-        }
+    let mut texts = row.iter().filter_map(|cell| match cell {
+        TableCell::Text(text) if !text.is_empty() => Some(text),
+        _ => None,
     });
-    texts
-        .filter(|text| !text.is_empty())
-        .collect::<Vec<_>>()
-        .join("\n  ")
+    texts.join("\n  ")
 }
 
 impl ReportArguments {
     /// Adds every selected chapter, in the order of the page.
-    #[expect(clippy::too_many_lines)]
     fn measure(
         &self,
         report: &mut Report,
@@ -230,14 +224,11 @@ impl ReportArguments {
         let is_wanted = |part| self.only.is_empty() || self.only.contains(&part);
         let given = self.given()?;
         // first, for they need what may not be there, and nothing measured is lost by that
-        let environment = self
-            .peers_env
-            .clone()
-            .unwrap_or_else(|| self.out.join("peers-env"));
-        let peers = self
-            .peers
-            .then(|| peers(effort, &environment, progress))
-            .transpose()?;
+        let environment = self.peers_env.clone();
+        let environment = environment.unwrap_or_else(|| self.out.join("peers-env"));
+        let peers = self.peers.then(|| peers(effort, &environment, progress));
+        let peers = peers.transpose()?;
+        let seeds = |default| self.seeds.as_ref().map_or(default, |seeds| seeds.0.clone());
         let mut add = |chapter: Chapter, verdict: Vec<String>| {
             report.chapters.push(chapter);
             report.verdict.extend(verdict);
@@ -271,19 +262,13 @@ impl ReportArguments {
         }
         if is_wanted(ReportChapter::Coverage) {
             let mut params = CoverageParams::of(effort);
-            params.seeds = self
-                .seeds
-                .as_ref()
-                .map_or(params.seeds, |seeds| seeds.0.clone());
+            params.seeds = seeds(params.seeds);
             let measured = coverage::coverage(params, progress);
             add(measured.chapter(), verdict::of_coverage(&measured));
         }
         if is_wanted(ReportChapter::Mistakes) {
             let mut params = MistakesParams::of(effort);
-            params.seeds = self
-                .seeds
-                .as_ref()
-                .map_or(params.seeds, |seeds| seeds.0.clone());
+            params.seeds = seeds(params.seeds);
             let measured = mistakes::mistakes(params, progress);
             add(measured.chapter(), verdict::of_mistakes(&measured));
         }
@@ -351,12 +336,10 @@ fn lines_on_stderr() -> impl FnMut(&str) {
 
 /// As it could be called again.
 fn command() -> String {
-    let arguments = std::env::args_os()
-        .skip(1)
-        .map(|word| word.to_string_lossy().into_owned());
+    let arguments = std::env::args_os().skip(1);
+    let arguments = arguments.map(|word| word.to_string_lossy().into_owned());
     let arguments = arguments.filter(|word| word != "--json");
     std::iter::once("touchup-report".to_owned())
         .chain(arguments)
-        .collect::<Vec<_>>()
         .join(" ")
 }

@@ -1,5 +1,5 @@
-//! Figures as SVG, on white. Its own drawing: the libraries for charts in Rust have no legend
-//! beside the frame and no text that shows when a cell is pointed at.
+//! Figures as SVG, on white. The drawing is our own: plotters (0.3) has no legend beside its frame
+//! and no title of a cell to point at.
 
 mod curves;
 mod element;
