@@ -1,5 +1,4 @@
-//! Who may see and who may do what: one-time links, cookies, roles, and the addresses by which the
-//! page is called.
+//! Authorisation of pages: one-time links, cookies, roles, and the host names of the page.
 
 use std::collections::VecDeque;
 use std::net::{IpAddr, SocketAddr};
@@ -10,16 +9,16 @@ use serde::{Deserialize, Serialize};
 use super::own_addresses::own_addresses;
 use crate::ros::locked;
 
-/// Links and cookies that are known at a time; the oldest go first.
+/// Maximum number of stored links, and of stored cookies; the oldest go first.
 const MOST_KNOWN: usize = 64;
 
-/// What a page may do.
+/// Permission of a page.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Role {
-    /// it is shown everything
+    /// view everything
     Look,
-    /// it also changes things
+    /// also change things
     Operate,
 }
 
@@ -28,7 +27,7 @@ pub enum Role {
 pub(super) struct Secret(String);
 
 impl Secret {
-    /// A new one, of the system's generator.
+    /// A new secret from the random number generator of the system.
     pub fn new() -> std::io::Result<Self> {
         let mut bytes = [0; 16];
         getrandom::fill(&mut bytes).map_err(std::io::Error::other)?;
@@ -37,12 +36,12 @@ impl Secret {
         ))
     }
 
-    /// As it is sent.
+    /// The 32 hexadecimal digits.
     pub fn text(&self) -> &str {
         &self.0
     }
 
-    /// Whether it is that; it takes as long for every other one of its length.
+    /// Equality, in constant time for texts of the same length.
     fn is(&self, given: &str) -> bool {
         let pairs = self.0.bytes().zip(given.bytes());
         self.0.len() == given.len()
@@ -50,18 +49,17 @@ impl Secret {
     }
 }
 
-/// Secrets with what they give, the oldest first.
+/// Secrets and their roles, the oldest first.
 type Known = VecDeque<(Secret, Role)>;
 
-/// Who may do what.
+/// Authorisation of pages.
 #[derive(Debug)]
 pub(super) struct Access {
-    /// as it is listened to
+    /// listening address
     address: SocketAddr,
-    /// the values of `Host` by which the page is called, beside the machine's own addresses where
-    /// it is listened to at all of them
+    /// accepted values of `Host`; at an unspecified address also the machine's own addresses
     hosts: Vec<String>,
-    /// by which links call it
+    /// host names in links
     names: Vec<String>,
     scheme: &'static str,
     /// without links everybody who reaches the address operates
@@ -72,9 +70,9 @@ pub(super) struct Access {
 }
 
 impl Access {
-    /// - `address`: to listen to.
-    /// - `names`: other names and addresses of this machine by which the page may be called.
-    /// - `by_link`: pages are let in by link alone.
+    /// - `address`: the listening address.
+    /// - `names`: further host names and addresses of the page.
+    /// - `by_link`: pages need a link.
     pub fn new(address: SocketAddr, names: &[String], by_link: bool, is_tls: bool) -> Self {
         let (scheme, usual) = if is_tls { ("https", 443) } else { ("http", 80) };
         let mut named: Vec<String> = names.to_vec();
@@ -104,13 +102,14 @@ impl Access {
         }
     }
 
-    /// Whether the page is called by one of its own names: a name that somebody else's server
-    /// answers for is none, whatever address it leads to.
+    /// Whether `Host` is a name of the page. A name on another's server is not, whatever address it
+    /// resolves to.
     pub fn is_host(&self, host: &str) -> bool {
         self.hosts.contains(&host.to_lowercase()) || self.is_own_address(host)
     }
 
-    /// Whether it is one that the machine has now, if all of them are listened to.
+    /// Whether the host is a present address of the machine; only at an unspecified listening
+    /// address.
     fn is_own_address(&self, host: &str) -> bool {
         let own = self.address.ip();
         let usual = if self.scheme == "https" { 443 } else { 80 };
@@ -125,8 +124,8 @@ impl Access {
             })
     }
 
-    /// The addresses of the page for links, as `http://192.168.0.7:8321`: by the given names first,
-    /// and by each address that the machine has now if all are listened to.
+    /// URLs of the page for links, as `http://192.168.0.7:8321`: by each given name first, then, at
+    /// an unspecified listening address, by each present address of the machine.
     pub fn urls(&self) -> Vec<String> {
         let (ip, port) = (self.address.ip(), self.address.port());
         let mut names = self.names.clone();
@@ -145,32 +144,32 @@ impl Access {
             .collect()
     }
 
-    /// Whether what asks was loaded from here: the value of `Origin`.
+    /// Whether `Origin` is this page.
     pub fn is_origin(&self, origin: &str) -> bool {
         origin
             .split_once("://")
             .is_some_and(|(scheme, host)| scheme == self.scheme && self.is_host(host))
     }
 
-    /// Whether a page has to be let in by a link.
+    /// Whether pages need a link.
     pub fn needs_cookie(&self) -> bool {
         self.needs_cookie
     }
 
-    /// A new link: its secret, good for one page.
+    /// A new link: its secret, valid for one page.
     ///
     /// # Errors
-    /// Where the system has no random numbers.
+    /// If the system has no random numbers.
     pub fn invite(&self, role: Role) -> std::io::Result<Secret> {
         let secret = Secret::new()?;
         remember(&self.links, &secret, role);
         Ok(secret)
     }
 
-    /// Uses a link up: the cookie to be set, with its name, and the role.
+    /// Consumes a link: the `Set-Cookie` value and the role.
     ///
     /// # Errors
-    /// Where the system has no random numbers.
+    /// If the system has no random numbers.
     pub fn pair(&self, token: &str) -> std::io::Result<Option<(String, Role)>> {
         let used = {
             let mut links = locked(&self.links);
@@ -195,7 +194,7 @@ impl Access {
         Ok(Some((text, role)))
     }
 
-    /// What the value of `Cookie` gives; `None`: nothing.
+    /// Role of a `Cookie` header; `None`: no valid cookie.
     pub fn role(&self, cookies: &str) -> Option<Role> {
         if !self.needs_cookie {
             return Some(Role::Operate);
@@ -223,7 +222,7 @@ fn remember(known: &Mutex<Known>, secret: &Secret, role: Role) {
     known.push_back((secret.clone(), role));
 }
 
-/// An address as links have it.
+/// Host part of a URL: an IPv6 address in brackets.
 pub(super) fn in_a_link(ip: IpAddr) -> String {
     match ip {
         IpAddr::V4(ip) => ip.to_string(),

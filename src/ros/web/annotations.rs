@@ -1,5 +1,5 @@
-//! What operators say of features: names, accepted or rejected, and numbers that are kept as they
-//! were. A file of the session.
+//! Annotations of features by operators, in a file of the session: names, acceptance, and locked
+//! values.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -12,14 +12,14 @@ use crate::io::session_folder::{read_text, write_text_file};
 use crate::ros::locked;
 use crate::ros::messages::Feature;
 
-/// Name of the file in the folder of a session.
+/// Name of the annotation file in a session folder.
 pub const ANNOTATIONS_FILE: &str = "annotations.json";
-/// Characters of a name at most.
+/// Maximum length of a name, characters.
 const LONGEST_NAME: usize = 80;
-/// Features that are annotated at most.
+/// Maximum number of annotated features.
 const MOST_ANNOTATED: usize = 10_000;
 
-/// What an operator thinks of a feature.
+/// Verdict of an operator on a feature.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum Mark {
@@ -29,17 +29,17 @@ pub(super) enum Mark {
     Rejected,
 }
 
-/// What is said of one feature.
+/// Annotation of one feature.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub(super) struct Annotation {
     pub name: String,
     pub mark: Mark,
-    /// the feature as it was when it was locked: this is what counts from then on
+    /// the feature at the time of its lock: the values that count from then on
     pub locked: Option<Value>,
 }
 
-/// The request of `~/annotate_feature`: what is left out stays as it is.
+/// The request of `~/annotate_feature`; a missing field keeps its value.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct AnnotateRequest {
@@ -53,11 +53,11 @@ pub(super) struct AnnotateRequest {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct SessionAnnotations {
     pub session: String,
-    /// by number of the feature
+    /// by feature number
     pub features: BTreeMap<u32, Annotation>,
 }
 
-/// Those of the session that runs.
+/// Annotations of the current session.
 #[derive(Debug)]
 pub(super) struct Annotations {
     folder: PathBuf,
@@ -65,7 +65,7 @@ pub(super) struct Annotations {
 }
 
 impl Annotations {
-    /// - `folder`: in which sessions lie.
+    /// - `folder`: parent of the session folders.
     pub fn new(folder: &Path) -> Self {
         Self {
             folder: folder.to_owned(),
@@ -77,7 +77,7 @@ impl Annotations {
         self.folder.join(session).join(ANNOTATIONS_FILE)
     }
 
-    /// Those of a session.
+    /// Annotations of a session.
     pub fn of(&self, session: &str) -> SessionAnnotations {
         let mut current = locked(&self.current);
         if current.session != session {
@@ -93,12 +93,12 @@ impl Annotations {
         current.clone()
     }
 
-    /// Says something of a feature.
+    /// Annotates a feature.
     ///
-    /// - `feature`: as it is now; `None`: there is none with this number.
+    /// - `feature`: its present state; `None`: no feature with this number.
     ///
     /// # Errors
-    /// In words: what is refused, or could not be written.
+    /// In words: a refused request, or a failed write.
     pub fn annotate(
         &self,
         session: &str,
@@ -181,7 +181,7 @@ mod tests {
                 hole(8.0),
             )
             .unwrap();
-        // what is locked stays as it was
+        // a locked feature keeps its values
         annotations
             .annotate("one", request(r#"{"id": 7, "is_locked": true}"#), hole(9.0))
             .unwrap();

@@ -1,4 +1,4 @@
-//! Work that takes seconds: on a thread of its own that gives way to those of the node.
+//! Work of seconds, on a thread with a lower priority than those of the node.
 
 use std::io;
 use std::thread::Builder;
@@ -7,10 +7,10 @@ use tokio::sync::oneshot::{Receiver, channel};
 
 use crate::threads::give_way;
 
-/// Begins the work; its result comes, unless it panics.
+/// Begins the work; the receiver gets its result, unless it panics.
 ///
 /// # Errors
-/// Where the system has no thread for it.
+/// If the system has no thread for it.
 pub(super) fn begin<T: Send + 'static>(
     name: &str,
     work: impl FnOnce() -> T + Send + 'static,
@@ -18,7 +18,7 @@ pub(super) fn begin<T: Send + 'static>(
     let (to, result) = channel();
     let run = move || {
         give_way();
-        // who asked may have gone
+        // the requester may have gone
         let _ = to.send(work());
     };
     Builder::new().name(name.to_owned()).spawn(run)?;

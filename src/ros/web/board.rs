@@ -1,5 +1,5 @@
-//! What the pages are shown: the newest of each topic, and the mesh. The node writes, and each page
-//! reads at its own pace.
+//! Content of the pages: the newest message of each topic, and the mesh. The node writes, and each
+//! page reads at its own pace.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex};
@@ -15,10 +15,10 @@ use crate::ros::messages::{
 };
 use crate::ros::port::Publication;
 
-/// Results and touches of an arm that are kept for who joins late; the oldest go first.
+/// Maximum number of stored arm results, and of touches, for late pages; the oldest go first.
 const MOST_KEPT: usize = 1000;
 
-/// The newest message of a topic, and its number among all that were written.
+/// The newest message of a topic, and its number among all messages.
 #[derive(Debug)]
 struct Newest<M>(u64, Option<M>);
 
@@ -42,7 +42,7 @@ impl<M: Serialize> Newest<M> {
     }
 }
 
-/// `{"topic": …, "message": …}`; numbers that are none are `null`.
+/// `{"topic": …, "message": …}`; non-finite numbers become `null`.
 pub(super) fn text_of(topic: &str, message: &impl Serialize) -> Option<String> {
     #[derive(Serialize)]
     struct Shown<'a, M> {
@@ -54,7 +54,7 @@ pub(super) fn text_of(topic: &str, message: &impl Serialize) -> Option<String> {
 
 #[derive(Debug, Default)]
 struct Topics {
-    /// messages written so far
+    /// number of messages
     written: u64,
     features: Newest<FeatureArray>,
     tip: Newest<MarkerArray>,
@@ -72,14 +72,14 @@ fn keep<M>(kept: &mut VecDeque<(u64, M)>, number: u64, message: M) {
     kept.push_back((number, message));
 }
 
-/// What is known of the vertices at one state, as frames for the pages.
+/// Vertex uncertainties and outlier marks at one state, as frames for the pages.
 #[derive(Debug)]
 pub(super) struct Known {
     pub state: MeshState,
     pub frames: Vec<Vec<u8>>,
 }
 
-/// Read by all pages.
+/// The content that all pages read.
 #[derive(Debug)]
 pub(super) struct Board {
     mesh: Mutex<MeshCopy>,
@@ -89,7 +89,7 @@ pub(super) struct Board {
 }
 
 impl Board {
-    /// - `whole`: the mesh as the node has it at its start.
+    /// - `whole`: the mesh of the node at its start.
     pub fn new(whole: impl Iterator<Item = MeshPatch>) -> Self {
         let mut mesh = MeshCopy::default();
         whole.for_each(|part| mesh.take(part));
@@ -101,7 +101,7 @@ impl Board {
         }
     }
 
-    /// Takes up what the node publishes.
+    /// Stores a publication of the node.
     pub fn write(&self, publication: Publication) {
         if let Publication::MeshPatch(patch) = publication {
             locked(&self.mesh).take(patch);
@@ -127,7 +127,7 @@ impl Board {
         self.changes.send_replace(());
     }
 
-    /// Comes whenever something was written.
+    /// Notifies of every change.
     pub fn changes(&self) -> watch::Receiver<()> {
         self.changes.subscribe()
     }
@@ -137,9 +137,9 @@ impl Board {
         self.changes.send_replace(());
     }
 
-    /// Messages on topics that a page has not seen, as text.
+    /// Messages that a page has not seen, as text.
     ///
-    /// - `seen`: how many were written when it last read; set anew.
+    /// - `seen`: number of messages at its last read; updated.
     pub fn read(&self, seen: &mut u64) -> Vec<String> {
         let topics = locked(&self.topics);
         let mut texts = Vec::new();
@@ -156,7 +156,7 @@ impl Board {
         texts
     }
 
-    /// A feature as it was published last.
+    /// The feature as last published.
     pub fn feature(&self, id: u32) -> Option<Feature> {
         let topics = locked(&self.topics);
         topics
@@ -169,38 +169,38 @@ impl Board {
             .cloned()
     }
 
-    /// A page comes.
+    /// Adds a page.
     pub fn join(&self, page: PageId) {
         locked(&self.mesh).join(page);
     }
 
-    /// … and goes.
+    /// Removes a page.
     pub fn leave(&self, page: PageId) {
         locked(&self.mesh).leave(page);
     }
 
-    /// More of the mesh for a page; as [`MeshCopy::next_for`].
+    /// The next part of the mesh for a page; as [`MeshCopy::next_for`].
     pub fn mesh_for(&self, page: PageId) -> Option<MeshPatch> {
         locked(&self.mesh).next_for(page)
     }
 
-    /// Session of the mesh, and the version that its shape came with.
+    /// Session of the mesh, and the version of its shape.
     pub fn shape_state(&self) -> MeshState {
         locked(&self.mesh).shape_state()
     }
 
-    /// The vertices that rest on touches.
+    /// The vertices with support other than the scan.
     pub fn touched(&self) -> Vec<TouchedVertex> {
         locked(&self.mesh).touched()
     }
 
-    /// What is known of the vertices at a state.
+    /// Sets the vertex uncertainties of a state.
     pub fn set_known(&self, known: Known) {
         *locked(&self.known) = Some(Arc::new(known));
         self.wake();
     }
 
-    /// … that is the one in which the mesh is now.
+    /// The vertex uncertainties, if they are of the present state of the mesh.
     pub fn known(&self) -> Option<Arc<Known>> {
         let known = locked(&self.known).clone()?;
         (known.state == self.shape_state()).then_some(known)

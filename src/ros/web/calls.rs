@@ -1,4 +1,4 @@
-//! The services of the node, as a page calls them: by name, with a request in JSON.
+//! The node's services for pages: called by name, with a request in JSON.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
@@ -13,16 +13,16 @@ use crate::ros::messages::RosService;
 use crate::ros::port::Reply;
 use crate::ros::services::{Serves, serve};
 
-/// Answers a request, now or later; `Err`: why not, in words.
+/// Reply to a request, now or later; `Err`: the reason of a failure, in words.
 pub(super) type Answer = Reply<Result<Value, String>>;
 type Service = Mutex<Box<dyn FnMut(Value, Answer) + Send>>;
 
-/// Why a call is refused.
+/// Reason of a refused call.
 pub(super) const MAY_ONLY_LOOK: &str =
     "this page may look and not operate: open it by a link for operators";
-/// What every page may ask.
+/// Services for every page.
 const ONLY_LOOKS: &[&str] = &["~/arm_state"];
-/// What moves an arm, unless it is a dry run: while it does, the page's button has to be held.
+/// Services that move an arm, except as a dry run; they need the page's hold-to-run button.
 const MOVES: &[&str] = &["~/probe_feature", "~/probe_all"];
 
 /// The services by name.
@@ -45,9 +45,9 @@ impl Calls {
         Ok(calls)
     }
 
-    /// Calls a service; what is wrong is answered as well.
+    /// Calls a service; errors come as a reply too.
     ///
-    /// - `request`: its fields; those that are left out are zero, empty or false.
+    /// - `request`: its fields; missing ones are zero, empty or false.
     pub fn call(&self, role: Role, name: &str, request: Value, reply: Answer) {
         let Some((known, service)) = self.services.get_key_value(name) else {
             return reply.send(Err(format!("there is no service \"{name}\"")));
@@ -97,7 +97,7 @@ where
     }
 }
 
-/// A request with what it leaves out.
+/// A request with defaults for missing fields.
 fn filled<Q>(given: Value) -> Result<Q, String>
 where
     Q: Default + serde::Serialize + serde::de::DeserializeOwned,

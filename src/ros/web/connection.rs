@@ -1,4 +1,4 @@
-//! One page at work: what it is sent, at its own pace, and what it asks.
+//! Connection of one page: sends content at the page's pace, and answers its calls.
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -21,35 +21,34 @@ use super::site::Site;
 use crate::ros::messages::MeshPatch;
 use crate::ros::port::Reply;
 
-/// A page is sent something new after so long at the earliest.
+/// Minimum interval between updates of a page.
 const FRAME: Duration = Duration::from_millis(33);
-/// So often a page hears something; it takes a silence of twice that for a lost connection.
+/// Interval of heartbeats to a page, which takes the connection for lost after two intervals.
 const SIGN_OF_LIFE: Duration = Duration::from_secs(5);
-/// A page that takes nothing, or from which nothing comes, for so long has gone: it answers each
-/// sign of life.
+/// Time-out for a page that accepts or sends nothing; it answers each heartbeat.
 const GONE_AFTER: Duration = Duration::from_secs(20);
-/// Answers that wait for a page at most.
+/// Maximum number of queued answers of a page.
 const MOST_ANSWERS: usize = 64;
-/// Messages of a page within a second, at most: a beat comes 50 times.
+/// Maximum rate of a page's messages, 1/s; hold-to-run beats come 50 times per second.
 const MOST_PER_SECOND: u32 = 200;
 /// Kind of a binary message: a `MeshPatch`.
 const MESH_PATCH: u8 = 1;
 
-/// What a page sends: a call of a service, or a beat of the button that is held.
+/// Message from a page: a service call, or a hold-to-run beat.
 #[derive(Debug, Deserialize)]
 struct Asked {
-    /// by which the page knows the answer
+    /// identifies the answer
     #[serde(default)]
     id: Value,
     /// name of the service
     call: Option<String>,
     #[serde(default)]
     request: Value,
-    /// how often it was sent
+    /// number of beats sent
     beat: Option<u64>,
 }
 
-/// Serves a page until it goes.
+/// Serves a page until it disconnects.
 pub(super) async fn serve(socket: WebSocket, site: Arc<Site>, role: Role) {
     let page = site.entrance.pages_so_far.fetch_add(1, Ordering::Relaxed);
     site.board.join(page);
@@ -74,7 +73,7 @@ pub(super) async fn serve(socket: WebSocket, site: Arc<Site>, role: Role) {
         () = hearing => {}
     }
     site.board.leave(page);
-    // the others show how many there are
+    // the other pages show the number of pages
     site.board.wake();
 }
 
@@ -111,7 +110,7 @@ fn hear(text: &str, site: &Site, role: Role, answers: &Sender<String>) {
             Ok(response) => json!({ "id": id, "response": response }),
             Err(why) => json!({ "id": id, "error": why }),
         };
-        // who asks more than it listens to gets no answer
+        // a page that does not read its answers loses them
         let _ = answers.try_send(said.to_string());
     });
     site.call(role, &call, request, reply);
@@ -160,18 +159,18 @@ async fn send(
         messages.extend(site.board.read(&mut seen).into_iter().map(Message::text));
         let mesh = site.board.mesh_for(page);
         let has_more = mesh.is_some();
-        // copied where there is something to compare with
+        // a copy only for the comparison with a nominal part
         let deviations = site
             .nominal
             .clone()
             .and_then(|nominal| Some((nominal, mesh.clone()?)));
         messages.extend(mesh.and_then(|patch| Some(Message::binary(frame_of(&patch)?))));
         if let Some((nominal, patch)) = deviations {
-            // a millisecond for each thousand vertices, in which no other page is to wait
+            // 1 ms per thousand vertices, which must not delay other pages
             let frame = tokio::task::spawn_blocking(move || nominal.frame(&patch)).await;
             messages.extend(frame.ok().flatten().map(Message::binary));
         }
-        // what is known of vertices comes after them
+        // uncertainties follow the vertices
         if !has_more
             && let Some(known) = site
                 .board
@@ -183,14 +182,14 @@ async fn send(
         }
         if signed.elapsed() >= SIGN_OF_LIFE {
             signed = Instant::now();
-            // the browser answers the one, the page sees the other
+            // the browser answers the ping; the page sees the text
             messages.extend([
                 Message::Ping(Default::default()),
                 Message::text(state.clone()),
             ]);
         }
         for message in messages {
-            // a full buffer of the system holds this page up, and nobody else
+            // a full system buffer delays this page alone
             if !matches!(timeout(GONE_AFTER, to_page.send(message)).await, Ok(Ok(()))) {
                 return;
             }
@@ -203,7 +202,7 @@ async fn send(
     }
 }
 
-/// Waits until there may be something new: at most for the period in which the state is looked at.
+/// Waits for a change or an answer, at most 200 ms, the polling period of the state.
 async fn wait(
     changes: &mut watch::Receiver<()>,
     answers: &mut Receiver<String>,
@@ -216,7 +215,7 @@ async fn wait(
     }
 }
 
-/// Kind, three zeros, and the message as it is on the wire of DDS.
+/// Kind, three zeros, and the message in CDR with its header, as DDS sends it.
 fn frame_of(patch: &MeshPatch) -> Option<Vec<u8>> {
     let body = cdr_encoding::to_vec::<_, LittleEndian>(patch).ok()?;
     let mut frame = Vec::with_capacity(8 + body.len());

@@ -1,4 +1,4 @@
-//! The sessions that can be downloaded, and their files piece by piece.
+//! List of downloadable sessions, and streams of their files.
 
 use std::io::{self, Read};
 use std::path::Path;
@@ -9,16 +9,16 @@ use serde_json::{Value, json};
 use crate::io::session_folder::{ListedSession, list_sessions};
 use crate::session::SessionFacts;
 
-/// Bytes that are read at a time.
+/// Bytes per read.
 const PIECE: usize = 256 << 10;
 
 /// All sessions, the newest first.
 ///
-/// - `current`: name of the session that runs.
+/// - `current`: name of the running session.
 pub(super) fn sessions(folder: &Path, current: &str) -> io::Result<Vec<Value>> {
     let listed = list_sessions(folder)?;
     let shown = |ListedSession { name, bytes, files }: ListedSession| {
-        // of the time of files nothing is taken: a copy has another one
+        // file times do not count: copies change them
         let begun = SessionFacts::read(&folder.join(&name))
             .ok()
             .and_then(|facts| facts.begun);
@@ -32,7 +32,7 @@ pub(super) fn sessions(folder: &Path, current: &str) -> io::Result<Vec<Value>> {
     Ok(listed.into_iter().map(shown).collect())
 }
 
-/// What is left to be read of a file, piece by piece, each on a thread that may wait for the disk.
+/// Stream of the rest of a file; reads run on threads that may block.
 pub(super) fn body_of(
     file: impl Read + Send + 'static,
 ) -> impl Stream<Item = io::Result<Vec<u8>>> + Send {

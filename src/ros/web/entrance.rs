@@ -1,5 +1,4 @@
-//! How everything on the page is reached, whatever is served behind it: the checks of each request,
-//! links that let pages in, and the files of the page.
+//! Access to the page, for every router: request checks, links, and the files of the page.
 
 use std::io;
 use std::sync::Arc;
@@ -20,35 +19,35 @@ use serde_json::json;
 use super::access::{Access, Role};
 use super::page::PAGE;
 
-/// The page loads nothing from elsewhere, and nobody shows it within another one.
+/// The page loads nothing from elsewhere, and no other page may frame it.
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; connect-src 'self'; \
                       manifest-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
-/// For how long a browser keeps a file of the page: whose name has a checksum in it, and others.
+/// Cache lifetimes of page files: with a checksum in the name, and without.
 const KEPT: &str = "public, max-age=31536000, immutable";
 const SEEN_AGAIN: &str = "no-cache";
 
-/// Who comes in, and by which names and links.
+/// Access control, and links to the page.
 #[derive(Debug)]
 pub(super) struct Entrance {
     pub access: Access,
-    /// tells the operator beside the machine
+    /// notifies the operator at the machine
     pub notify: fn(&Invitation),
-    /// pages that were ever opened on a node
+    /// number of pages ever opened on a node
     pub pages_so_far: AtomicU64,
 }
 
 /// A link for one page, in words and as a QR code.
 #[derive(Clone, Debug)]
 pub struct Invitation {
-    /// the link at each address of the page, and what it gives
+    /// the link at each address of the page, and its role
     pub text: String,
-    /// lines of half blocks, dark on light; empty for who only looks
+    /// lines of half blocks, dark on light; empty for viewers
     pub code: String,
 }
 
 impl Entrance {
-    /// The role of who asks.
+    /// The role of a request.
     pub fn role_of(&self, headers: &HeaderMap) -> Result<Role, Box<Response>> {
         let cookies = headers
             .get(header::COOKIE)
@@ -60,8 +59,7 @@ impl Entrance {
             .ok_or_else(|| Box::new(refusal(StatusCode::UNAUTHORIZED, why)))
     }
 
-    /// A link that lets another page in where one needs it, and its QR code, row by row: 1 where it
-    /// is dark.
+    /// A link for another page, with a token if pages need one, and its QR code by rows: 1 is dark.
     pub fn invite(&self, role: Role) -> io::Result<(String, Vec<String>)> {
         let mut link = self.access.urls().swap_remove(0);
         if self.access.needs_cookie() {
@@ -73,7 +71,7 @@ impl Entrance {
         Ok((link, code))
     }
 
-    /// Somebody came in by a link, which is used up: here is the next.
+    /// Announces the next link after a page has used one.
     fn note_paired(&self, role: Role) {
         match self.invitation(role) {
             Ok(Invitation { text, code }) => {
@@ -84,7 +82,7 @@ impl Entrance {
         }
     }
 
-    /// A new link in words, and as a QR code.
+    /// A new link, in words and as a QR code.
     pub fn invitation(&self, role: Role) -> io::Result<Invitation> {
         let secret = self.access.invite(role)?;
         let mut links = self.access.urls();
@@ -116,7 +114,7 @@ impl Entrance {
                 "this page is called by another name: use the address that touchup printed, or allow the name by --web-name",
             );
         }
-        // who changes something, or opens the socket, says where it was loaded from
+        // requests that change something or open the socket need an origin
         let needs_origin = method != Method::GET && method != Method::HEAD
             || headers.contains_key(header::UPGRADE);
         match text(header::ORIGIN) {
@@ -148,7 +146,7 @@ fn in_words(role: Role) -> &'static str {
     }
 }
 
-/// What is served before and beside everything else: the page itself, and the way in.
+/// Routes of every router: the page itself, and pairing by links.
 pub(super) fn routes(entrance: &Arc<Entrance>) -> Router {
     Router::new()
         .route(
@@ -161,7 +159,7 @@ pub(super) fn routes(entrance: &Arc<Entrance>) -> Router {
                 asset(&name, KEPT, &headers)
             }),
         )
-        // names of these have no checksum in them
+        // names without a checksum
         .route(
             "/{name}",
             get(|Path(name): Path<String>, headers: HeaderMap| async move {
@@ -172,7 +170,7 @@ pub(super) fn routes(entrance: &Arc<Entrance>) -> Router {
         .with_state(Arc::clone(entrance))
 }
 
-/// Host and origin of every request; what goes out with every answer.
+/// Checks host and origin of every request, and adds security headers to every answer.
 pub(super) async fn check(
     State(entrance): State<Arc<Entrance>>,
     request: Request,
@@ -198,7 +196,7 @@ pub(super) async fn check(
     response
 }
 
-/// Nothing else is at this address.
+/// Answer for an unknown path.
 pub(super) async fn nothing() -> Response {
     refusal(StatusCode::NOT_FOUND, "there is nothing at this address")
 }
@@ -213,7 +211,7 @@ pub(super) fn refusal(status: StatusCode, why: &str) -> Response {
         .into_response()
 }
 
-/// An answer that no cache keeps.
+/// JSON answer that no cache keeps.
 pub(super) fn as_json(value: &impl serde::Serialize) -> Response {
     let text = serde_json::to_string(value).unwrap_or_default();
     (
@@ -253,7 +251,7 @@ struct PairQuery {
     token: String,
 }
 
-/// A link that somebody follows.
+/// Pairs a page by a link.
 async fn pair(
     State(entrance): State<Arc<Entrance>>,
     Query(PairQuery { token }): Query<PairQuery>,

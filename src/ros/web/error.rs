@@ -1,4 +1,4 @@
-//! Why the page is not served.
+//! Errors of the page server.
 
 use std::io;
 use std::net::SocketAddr;
@@ -6,31 +6,31 @@ use std::path::PathBuf;
 
 use crate::ros::exchange::RosError;
 
-/// Why the page is not served.
+/// Error of the page server.
 #[derive(Debug, thiserror::Error)]
 pub enum WebError {
-    /// the address cannot be listened to
+    /// no listening at the address
     #[error(
         "the page cannot be served at {address}: {source}; choose another address or port by --web"
     )]
     Address {
-        /// which
+        /// address
         address: SocketAddr,
-        /// what the system says
+        /// error of the system
         source: io::Error,
     },
-    /// a file of the certificate is none
+    /// invalid file of a certificate
     #[error("{}: {why}; --web-certificate and --web-key take PEM files", .file.display())]
     Certificate {
-        /// which
+        /// file
         file: PathBuf,
-        /// what is wrong with it
+        /// reason
         why: String,
     },
-    /// nothing can be set up with these
+    /// invalid setup parameters
     #[error("{0}")]
     Setup(String),
-    /// a service has a name that is none
+    /// invalid service name
     #[error(transparent)]
     Ros(#[from] RosError),
     /// no thread, no random numbers

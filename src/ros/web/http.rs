@@ -1,5 +1,5 @@
-//! What the page's address answers while a node runs: the page itself, the socket, and files of
-//! sessions. Each request is checked before anything is looked at.
+//! Routes of the page while a node runs: the page itself, the socket, and files of sessions. Each
+//! request passes the checks first.
 
 use std::sync::Arc;
 
@@ -24,14 +24,14 @@ use super::replay::{self, Replays};
 use super::reports;
 use super::site::Site;
 
-/// Bytes that a page may send in one message.
+/// Maximum size of a message from a page, bytes.
 const LARGEST_MESSAGE: usize = 64 << 10;
-/// Bytes that wait for a page in the socket at most.
+/// Maximum backlog of the socket to a page, bytes.
 const LARGEST_BACKLOG: usize = 8 << 20;
 /// The protocol of the socket.
 const PROTOCOL: &str = "touchup.v1";
 
-/// All that is answered.
+/// All routes.
 pub(super) fn router(site: Arc<Site>, replays: Arc<Replays>) -> Router {
     let checked = from_fn_with_state(Arc::clone(&site.entrance), entrance::check);
     let page = entrance::routes(&site.entrance);
@@ -51,7 +51,7 @@ pub(super) fn router(site: Arc<Site>, replays: Arc<Replays>) -> Router {
         .layer(checked)
 }
 
-/// The node runs: nothing is to be set up.
+/// The node runs: no setup remains.
 async fn no_setup(State(site): State<Arc<Site>>, headers: HeaderMap) -> Response {
     role_of(&site, &headers).map_or_else(
         |response| *response,
@@ -59,15 +59,15 @@ async fn no_setup(State(site): State<Arc<Site>>, headers: HeaderMap) -> Response
     )
 }
 
-/// The role of who asks.
+/// The role of a request.
 fn role_of(site: &Site, headers: &HeaderMap) -> Result<Role, Box<Response>> {
     site.entrance.role_of(headers)
 }
 
-/// What the socket is for.
+/// Query of a socket.
 #[derive(Debug, Deserialize)]
 struct SocketQuery {
-    /// session that is to be replayed; without one it is that of the node
+    /// replayed session; `None`: the session of the node
     replay: Option<String>,
 }
 

@@ -1,5 +1,5 @@
-//! How well the mesh is known where it was touched, for the colours of the page: evaluated while
-//! nothing changes, and only where somebody looks.
+//! Uncertainty of the touched mesh, for the colours of the page: evaluated while the mesh rests,
+//! and only for open pages.
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -19,17 +19,16 @@ use crate::mesh::{FaceTree, TriMesh};
 use crate::reconstruct::Patcher;
 use crate::ros::port::{Arrival, Reply};
 
-/// Period of the look at the mesh.
+/// Polling period of the mesh.
 const LOOK: Duration = Duration::from_millis(250);
-/// The mesh is at rest when it has not changed for so long: somewhat longer than the node takes to
-/// settle it.
+/// The mesh rests after this time without a change: somewhat longer than the node's settling time.
 const QUIET: Duration = Duration::from_millis(1000);
-/// How long the copy of the evidence may take.
+/// Time-out for the copy of the evidence.
 const COPY_WAIT: Duration = Duration::from_secs(30);
-/// Vertices this near to a contact that was rejected are marked, m.
+/// Radius of marked vertices around a rejected contact, m.
 const BESIDE_OUTLIER: f64 = 1e-3;
 
-/// Evaluates each state at which the mesh rests, until it is dropped.
+/// Evaluates each state in which the mesh rests, until dropped.
 pub(super) async fn follow(site: Arc<Site>) {
     let (mut seen, mut still, mut done) =
         (MeshState::default(), Instant::now(), MeshState::default());
@@ -45,13 +44,13 @@ pub(super) async fn follow(site: Arc<Site>) {
         }
         done.clone_from(&state);
         let (to, copy) = oneshot::channel();
-        // who asked is still there
+        // the receiver still waits
         site.inbox.put(Arrival::Evidence(Reply::new(move |copy| {
             drop(to.send(copy))
         })));
         let Ok(Some(copy)) = copy.await else { continue };
         let (scan, touched) = (Arc::clone(&site.scan_mesh), site.board.touched());
-        // of a replay it may be, beside a session that goes on
+        // it may be of a replay, beside a running session
         let Ok(evaluated) = begin("knowledge", move || frames_of(&copy, &scan, &touched)) else {
             continue;
         };

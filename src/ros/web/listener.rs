@@ -1,4 +1,4 @@
-//! Connections to the page: how many at a time, within which times, with or without TLS.
+//! Connections to the page: their number, time-outs and TLS.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -23,11 +23,11 @@ use super::error::WebError;
 use crate::io::text_file::read_text;
 use crate::ros::locked;
 
-/// Connections at a time at most.
+/// Maximum number of connections.
 const MOST_CONNECTIONS: usize = 64;
-/// A client has so long for the TLS handshake, and for the head of each request.
+/// Time-out for the TLS handshake, and for the head of each request.
 const HEAD_WITHIN: Duration = Duration::from_secs(10);
-/// Wait after an error of the system, as too many open files.
+/// Wait after a system error, as too many open files.
 const AFTER_ERROR: Duration = Duration::from_millis(100);
 
 /// Files of a certificate and of its key, PEM.
@@ -40,7 +40,7 @@ pub struct Certificate {
 }
 
 impl Certificate {
-    /// What accepts TLS by it.
+    /// TLS acceptor.
     pub(super) fn acceptor(&self) -> Result<TlsAcceptor, WebError> {
         let bad = |file: &Path, why: String| WebError::Certificate {
             file: file.to_owned(),
@@ -63,17 +63,17 @@ impl Certificate {
     }
 }
 
-/// What is served, which changes while connections are open.
+/// The served routes, which change while connections are open.
 #[derive(Clone, Debug)]
 pub(super) struct Routes(Arc<Mutex<Router>>);
 
 impl Routes {
-    /// At first.
+    /// The first routes.
     pub fn new(router: Router) -> Self {
         Self(Arc::new(Mutex::new(router)))
     }
 
-    /// From now on.
+    /// Replaces the routes.
     pub fn set(&self, router: Router) {
         *locked(&self.0) = router;
     }
@@ -83,7 +83,7 @@ impl Routes {
     }
 }
 
-/// Serves until it is dropped.
+/// Serves until dropped.
 pub(super) async fn serve(listener: TcpListener, tls: Option<TlsAcceptor>, routes: Routes) {
     let room = Arc::new(Semaphore::new(MOST_CONNECTIONS));
     loop {
@@ -100,7 +100,7 @@ pub(super) async fn serve(listener: TcpListener, tls: Option<TlsAcceptor>, route
         };
         let (tls, routes) = (tls.clone(), routes.clone());
         tokio::spawn(async move {
-            // a client that goes away is no matter of ours
+            // a client's disconnect is no error
             let _ = connect(stream, tls, routes).await;
             drop(place);
         });
@@ -108,7 +108,7 @@ pub(super) async fn serve(listener: TcpListener, tls: Option<TlsAcceptor>, route
 }
 
 async fn connect(stream: TcpStream, tls: Option<TlsAcceptor>, routes: Routes) -> io::Result<()> {
-    // a change of the mesh does not wait for the next
+    // a mesh change does not wait for the next one
     stream.set_nodelay(true)?;
     match tls {
         None => answer(stream, routes).await,
@@ -124,7 +124,7 @@ async fn answer(
     http.timer(TokioTimer::new())
         .header_read_timeout(HEAD_WITHIN)
         .max_buf_size(64 << 10);
-    // a connection that stays open is answered by what is served when it asks
+    // an open connection gets the routes at the time of its request
     let service = service_fn(move |request| TowerToHyperService::new(routes.now()).call(request));
     let connection = http.serve_connection(TokioIo::new(stream), service);
     connection.with_upgrades().await.map_err(io::Error::other)

@@ -1,8 +1,8 @@
-//! The mesh as the pages of browsers have it: a copy in the numbers of `MeshPatch`, and for each
-//! page what it still lacks.
+//! Copy of the mesh for pages of browsers, in the numbers of `MeshPatch`, with the missing parts of
+//! each page.
 //!
-//! A page that is slow lacks more, and gets it as it is then: what waits for it is a set of
-//! numbers, bounded by the mesh.
+//! A slow page lacks more, and gets the then newest state: its backlog is a set of numbers, bounded
+//! by the mesh.
 
 use std::collections::BTreeMap;
 
@@ -12,20 +12,20 @@ use crate::mesh::IdSet;
 use crate::reconstruct::Support;
 use crate::ros::messages::{MeshPatch, Time};
 
-/// Vertices, or faces, of one message at most: 1.4 MB.
+/// Maximum number of vertices, or faces, of one message: 1.4 MB.
 pub(super) const OF_A_MESSAGE: usize = 1 << 16;
 
-/// Support of a vertex that is not there.
+/// Support of a missing vertex.
 const NO_VERTEX: u8 = u8::MAX;
-/// Corners of a face that is not there.
+/// Corners of a missing face.
 const NO_FACE: [u32; 3] = [u32::MAX; 3];
 
 /// A state of the shape of the mesh: session and version.
 pub(super) type MeshState = (String, u64);
-/// A vertex that rests on touches: its number, its place, m in O, and its support.
+/// A vertex with support other than the scan: number, position in m in O, support.
 pub(super) type TouchedVertex = (u32, Point3<f64>, Support);
 
-/// What a vertex rests on that does not rest on the scan.
+/// Support of a vertex other than the scan.
 fn known_by(support: u8) -> Option<Support> {
     match support {
         MeshPatch::SUPPORT_TOUCHED => Some(Support::Touched),
@@ -35,27 +35,27 @@ fn known_by(support: u8) -> Option<Support> {
     }
 }
 
-/// Number of a page, never given twice.
+/// Unique number of a page.
 pub(super) type PageId = u64;
 
-/// What one page lacks.
+/// Missing parts of one page.
 #[derive(Debug, Default)]
 struct Lacking {
     vertices: IdSet,
     faces: IdSet,
-    /// state that it has; 0: none
+    /// the page's state; 0: none
     version: u64,
-    /// messages since the last state that it had completely
+    /// number of messages since its last complete state
     part: u32,
 }
 
-/// The mesh, and who lacks what of it.
+/// The mesh, and the missing parts of each page.
 #[derive(Debug, Default)]
 pub(super) struct MeshCopy {
     frame: String,
     session: String,
     version: u64,
-    /// … in which the shape changed last: in later ones only variances are others
+    /// version of the last change of shape: later ones change variances only
     shape_version: u64,
     stamp: Time,
     /// m
@@ -67,22 +67,22 @@ pub(super) struct MeshCopy {
     /// vertices and faces in the version
     counts: [u32; 2],
     pages: BTreeMap<PageId, Lacking>,
-    /// the whole state of a new session is on its way: until its last part the mesh is none
+    /// the whole state of a new session is incomplete: pages get no mesh
     is_coming: bool,
-    /// changes that wait for the end of that
+    /// changes that wait for the complete state
     later: Vec<MeshPatch>,
     /// the first parts of a change
     begun: Vec<MeshPatch>,
 }
 
 impl MeshCopy {
-    /// Takes up what the node publishes, in its order.
+    /// Applies patches of the node, in its order.
     pub fn take(&mut self, patch: MeshPatch) {
         let is_new = self.session != patch.session;
         match patch.base_version {
             0 if is_new => self.begin(patch),
             0 if self.is_coming => self.part_of_whole(&patch),
-            // of another session, or a whole state that only others need
+            // of another session, or a whole state for another follower
             0 => {}
             _ if is_new => {}
             _ if self.is_coming => self.later.push(patch),
@@ -117,8 +117,7 @@ impl MeshCopy {
         }
     }
 
-    /// A change is taken up as a whole, so that the mesh is that of a version whenever somebody
-    /// reads it.
+    /// Applies a change once complete, so that readers always see one version.
     fn part_of_change(&mut self, patch: MeshPatch) {
         let is_last = patch.part + 1 == patch.part_count;
         self.begun.push(patch);
@@ -190,7 +189,7 @@ impl MeshCopy {
             .for_each(|lacking| lacking.vertices.insert(vertex));
     }
 
-    /// A page that has nothing yet.
+    /// Adds a page without any data.
     pub fn join(&mut self, page: PageId) {
         let mut lacking = Lacking::default();
         let vertices = (0..)
@@ -204,17 +203,17 @@ impl MeshCopy {
         self.pages.insert(page, lacking);
     }
 
-    /// It has gone.
+    /// Removes a page.
     pub fn leave(&mut self, page: PageId) {
         self.pages.remove(&page);
     }
 
-    /// Session, and the version that the shape came with.
+    /// Session, and the version of the shape.
     pub fn shape_state(&self) -> MeshState {
         (self.session.clone(), self.shape_version)
     }
 
-    /// The vertices that rest on touches, on a guess between them or beside them.
+    /// The vertices with support by touches, guessed, or unreachable.
     pub fn touched(&self) -> Vec<TouchedVertex> {
         let place = |at: usize| Point3::from(self.positions[at].map(f64::from));
         let vertices = (0..).zip(&self.support);
@@ -229,13 +228,12 @@ impl MeshCopy {
         &self.session
     }
 
-    /// More of what a page lacks, as it is now, vertices before faces; `None` when it lacks
-    /// nothing.
+    /// The next part that a page lacks, in its present state, vertices before faces; `None`: the
+    /// page is complete.
     ///
-    /// In parts, a state may change between them: a face may name a vertex that comes with the
-    /// next.
+    /// A state may change between parts: a face may name a vertex of the next part.
     pub fn next_for(&mut self, page: PageId) -> Option<MeshPatch> {
-        // there is none yet
+        // no mesh yet
         if self.is_coming || self.version == 0 {
             return None;
         }
@@ -335,7 +333,7 @@ mod tests {
                 .retain(|vertex, _| !patch.removed_vertices.contains(vertex));
         }
 
-        /// Takes all that there is for it; in how many messages.
+        /// Applies all pending messages; returns their number.
         fn catch_up(&mut self, copy: &mut MeshCopy, page: PageId) -> usize {
             std::iter::from_fn(|| copy.next_for(page))
                 .inspect(|patch| self.take(patch))
@@ -441,8 +439,7 @@ mod tests {
         assert_eq!(page.faces.len(), 1);
     }
 
-    /// What was touched is known when the mesh rests: nothing of its shape is to be evaluated again
-    /// for that.
+    /// Touch variances come when the mesh rests: they need no new evaluation of the shape.
     #[test]
     fn a_variance_comes_to_the_pages_and_is_no_other_shape() {
         let mut copy = MeshCopy::default();

@@ -1,9 +1,8 @@
-//! The operator's page: a port beside that of the network. What the node publishes goes to both,
-//! and what a page asks comes into the same inbox.
+//! The operator page: a port beside the network's. The node's publications go to both, and calls of
+//! pages come into the same inbox.
 //!
-//! One thread of its own, with all pages on it. The node only notes what is new, under a lock that
-//! is held for as long as a message is copied: a page that is slow has less to show, and nobody
-//! waits for it.
+//! One thread serves all pages. The node only stores news under a lock, for the time of a message
+//! copy: a slow page skips states and delays nobody.
 
 mod access;
 mod annotations;
@@ -65,39 +64,39 @@ use super::port::Port;
 use crate::io::mesh_file::MeshUnit;
 use crate::mesh::{FaceTree, TriMesh};
 
-/// Where the page is served, and how.
+/// Address and access of the page.
 #[derive(Clone, Debug)]
 pub struct WebParams {
-    /// port 0: any that is free
+    /// port 0: any free port
     pub address: SocketAddr,
-    /// names of this machine by which the page may be called, beside the address
+    /// further host names of the page
     pub names: Vec<String>,
-    /// lets in by link alone; otherwise everybody who reaches the address operates
+    /// pages need a link; otherwise everybody who reaches the address operates
     pub by_link: bool,
-    /// TLS by it; `None`: no TLS
+    /// TLS certificate; `None`: no TLS
     pub certificate: Option<Certificate>,
 }
 
-/// Facts about the node that stay as they are while it runs.
+/// Constant facts about the node.
 #[derive(Debug)]
 pub struct NodeFacts {
-    /// where the scan was read from
+    /// file of the scan
     pub scan: PathBuf,
-    /// it, m in O, with the tree over its faces
+    /// the scan, m in O, with the tree over its faces
     pub scan_mesh: Arc<(TriMesh, FaceTree)>,
-    /// whether an operator has just said on the page how large it is
+    /// whether an operator has just confirmed its size on the page
     pub is_size_confirmed: bool,
-    /// where sessions lie, each in a folder of its own
+    /// parent of the session folders
     pub session_folder: PathBuf,
-    /// the part as it should be, m in O; `None`: nobody said
+    /// the nominal part, m in O; `None`: not given
     pub nominal: Option<TriMesh>,
-    /// its file, in the unit of the scan
+    /// file of the nominal part, in the unit of the scan
     pub nominal_file: Option<PathBuf>,
-    /// unit of the coordinates in files of meshes
+    /// unit of the coordinates in mesh files
     pub mesh_unit: MeshUnit,
 }
 
-/// Serves until it is dropped.
+/// Serves until dropped.
 pub struct WebServer {
     invitations: Vec<Invitation>,
     entrance: Arc<Entrance>,
@@ -108,9 +107,9 @@ pub struct WebServer {
 }
 
 impl WebServer {
-    /// Serves the files of the page and nothing else yet.
+    /// Serves only the files of the page at first.
     ///
-    /// - `notify`: tells the operator beside the machine of the next link, when one was used.
+    /// - `notify`: announces the next link to the operator at the machine, after the use of one.
     ///
     /// # Errors
     /// [`WebError`]
@@ -172,7 +171,7 @@ impl WebServer {
         })
     }
 
-    /// Serves what a node is made ready with, until one is.
+    /// Serves the setup of a node, until one runs.
     ///
     /// # Errors
     /// [`WebError::Setup`]
@@ -182,9 +181,9 @@ impl WebServer {
         Ok(setup)
     }
 
-    /// Serves a node: the port for it, which sends to `network` and to the page.
+    /// Serves a node: returns its port, which sends to `network` and to the page.
     ///
-    /// - `whole`: the mesh as the node has it at its start.
+    /// - `whole`: the mesh of the node at its start.
     ///
     /// # Errors
     /// [`WebError`]
@@ -234,7 +233,7 @@ impl WebServer {
         self.entrance.pages_so_far.load(Ordering::Relaxed) > 0
     }
 
-    /// Links by which pages are let in, each with what it gives; none where everybody is.
+    /// Links to the page with their roles; none if pages need no link.
     pub fn invitations(&self) -> &[Invitation] {
         &self.invitations
     }
@@ -244,7 +243,7 @@ impl Drop for WebServer {
     fn drop(&mut self) {
         self.stop.notify_one();
         if let Some(thread) = self.thread.take() {
-            // one that panicked has said so
+            // a thread that panicked has reported it
             let _ = thread.join();
         }
     }

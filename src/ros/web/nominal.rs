@@ -1,4 +1,4 @@
-//! How far the mesh is from the nominal part, vertex by vertex, for the colours of the page.
+//! Deviation of each vertex from the nominal part, for the colours of the page.
 
 use nalgebra::Point3;
 
@@ -6,10 +6,10 @@ use super::vertex_numbers::{VertexNumber, frame};
 use crate::mesh::{FaceTree, TriMesh, signed_distance};
 use crate::ros::messages::MeshPatch;
 
-/// Deviations are looked for within this distance, m: farther off is another part.
+/// Maximum distance of a deviation, m: surfaces farther off belong to another part.
 const REACH: f64 = 20e-3;
 
-/// The part as it should be, in the frame of the mesh.
+/// The nominal part, in the frame of the mesh.
 #[derive(Debug)]
 pub(super) struct Nominal {
     mesh: TriMesh,
@@ -26,7 +26,7 @@ impl Nominal {
     }
 
     /// Deviations of the vertices that a patch sets, positive outside of the nominal part; NaN
-    /// beyond the reach. `None` where it sets none.
+    /// beyond the reach. `None`: it sets no vertex.
     pub fn frame(&self, patch: &MeshPatch) -> Option<Vec<u8>> {
         if patch.vertices.is_empty() {
             return None;

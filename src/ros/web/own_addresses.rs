@@ -1,12 +1,12 @@
-//! The addresses by which others reach this machine.
+//! Addresses of this machine for other machines.
 
 use std::net::{IpAddr, UdpSocket};
 
 use nix::ifaddrs::getifaddrs;
 
-/// Those that a server at `unspecified` is reached by from other machines, that of the way to other
-/// networks first: IPv4 alone, or with `::` both. Those of a single link are none, as no browser
-/// takes them.
+/// Addresses of a server at `unspecified` for other machines, that on the route to other networks
+/// first: IPv4 alone, or with `::` both. Link-local addresses are left out, as browsers refuse
+/// them.
 pub(super) fn own_addresses(unspecified: IpAddr) -> Vec<IpAddr> {
     let interfaces = getifaddrs().map(Vec::from_iter).unwrap_or_default();
     let addresses = interfaces.iter().filter_map(|interface| {
@@ -28,9 +28,9 @@ pub(super) fn own_addresses(unspecified: IpAddr) -> Vec<IpAddr> {
     addresses
 }
 
-/// The address of the way to other networks; nothing is sent.
+/// Own address on the route to other networks; sends nothing.
 fn way_out() -> Option<IpAddr> {
-    // of a block for documentation (RFC 5737)
+    // of a documentation block (RFC 5737)
     let socket = UdpSocket::bind("0.0.0.0:0").ok()?;
     socket.connect("192.0.2.1:9").ok()?;
     Some(socket.local_addr().ok()?.ip())

@@ -1,4 +1,4 @@
-//! The files of the page, as npm built them from `web/` when the program was compiled.
+//! The files of the page, which npm built from `web/` at compile time.
 
 /// A file of the page.
 #[derive(Debug)]
@@ -7,7 +7,7 @@ pub(super) struct PageFile {
     pub name: &'static str,
     pub content_type: &'static str,
     pub bytes: &'static [u8],
-    /// the same compressed, where that is smaller
+    /// compressed content, if smaller
     pub gzip: Option<&'static [u8]>,
 }
 

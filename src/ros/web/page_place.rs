@@ -1,18 +1,18 @@
-//! Places for pages: so many are open at a time, and each is counted.
+//! Limits the number of open pages, and counts them.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::site::Site;
 
-/// Pages at a time at most.
+/// Maximum number of pages.
 const MOST_PAGES: usize = 16;
 
-/// One of the pages at a time; free again when it is dropped.
+/// Place of one page; dropping it frees the place.
 pub(super) struct PagePlace(Arc<Site>);
 
 impl PagePlace {
-    /// Takes a place; `None`: there is none left.
+    /// Takes a place; `None`: all places are taken.
     pub fn take(site: &Arc<Site>) -> Option<Self> {
         let is_there = |count: usize| (count < MOST_PAGES).then_some(count + 1);
         let taken = site

@@ -1,4 +1,4 @@
-//! The port of a node whose page is served: what it publishes goes to the network and to the pages.
+//! The port of a node with a page: publications go to the network and to the pages.
 
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ pub(super) struct PagePort {
 
 impl Port for PagePort {
     fn publish(&self, publication: Publication) {
-        // those are the mesh and the features again, drawn for RViz
+        // both repeat the mesh and the features, for RViz
         if !matches!(
             publication,
             Publication::Tile(_) | Publication::FeatureMarkers(_)

@@ -1,5 +1,5 @@
-//! What a page asks of a report: where nominal values are from, and what the flags of `touchup
-//! inspect` would say.
+//! Request of a report by a page: the source of the nominal values, and the flags of `touchup
+//! inspect`.
 
 use std::path::{Path, PathBuf};
 
@@ -10,16 +10,16 @@ use crate::io::mesh_file::MeshUnit;
 use crate::io::nominal_file::is_nominal_file;
 use crate::io::session_folder::SessionFolder;
 
-/// Bytes of a CAD mesh that is handed in, at most.
+/// Maximum size of an uploaded CAD mesh, bytes.
 const LARGEST_MESH: u64 = 64 << 20;
-/// … and of a table: some ten thousand characteristics.
+/// Maximum size of an uploaded table, bytes: some ten thousand characteristics.
 const LARGEST_TABLE: u64 = 1 << 20;
-/// Characters of a text in the head of the report at most.
+/// Maximum length of a text in the head of the report, characters.
 const LONGEST_TEXT: usize = 200;
-/// The files of nominal values in the folder of a session.
+/// Files of nominal values in a session folder.
 const IN_SESSION: [&str; 2] = ["nominal.csv", "nominal.json"];
 
-/// Where nominal values are from.
+/// Source of nominal values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum NominalSource {
@@ -31,15 +31,15 @@ pub(super) enum NominalSource {
     Session,
 }
 
-/// The query of a request; what is left out is as on the command line.
+/// The query of a request; defaults are those of the command line.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ReportRequest {
     pub nominal: NominalSource,
-    /// name of the file that is handed in, or of that in the folder of the session
+    /// name of the uploaded file, or of the file in the session folder
     #[serde(default)]
     file: String,
-    /// of a CAD mesh; left out: that of the session
+    /// unit of a CAD mesh; default: that of the session
     unit: Option<MeshUnit>,
     general: Option<String>,
     tolerance_mm: Option<f64>,
@@ -60,7 +60,7 @@ impl ReportRequest {
     /// - `unit`: of the session.
     ///
     /// # Errors
-    /// In words: what is no value.
+    /// In words: an invalid value.
     pub fn params(&self, unit: MeshUnit) -> Result<InspectionParams, String> {
         let mut params = InspectionParams::default();
         params.drawing.unit = self.unit.unwrap_or(unit);
@@ -83,10 +83,10 @@ impl ReportRequest {
         Ok(params)
     }
 
-    /// Name of the file that is handed in, and how many bytes it may have.
+    /// Name of the uploaded file, and its maximum size in bytes.
     ///
     /// # Errors
-    /// In words: another one is needed.
+    /// In words: an unsupported file type.
     pub fn upload(&self) -> Result<(&str, u64), String> {
         let name = Path::new(&self.file);
         let ending = name
@@ -107,7 +107,7 @@ impl ReportRequest {
     /// The file in the folder of a session.
     ///
     /// # Errors
-    /// In words: it is no such file, or a link to elsewhere.
+    /// In words: an unknown file name, or a link to elsewhere.
     pub fn in_session(&self, session: &SessionFolder) -> Result<PathBuf, String> {
         if IN_SESSION.contains(&&*self.file) {
             session
@@ -123,7 +123,7 @@ impl ReportRequest {
     }
 }
 
-/// What a field says; an error names the field.
+/// Parsed value of a field; an error names the field.
 fn read<T>(
     field: &str,
     text: Option<&str>,
@@ -134,7 +134,7 @@ fn read<T>(
         .map_err(|why| format!("{field}: {why}"))
 }
 
-/// A text of one line; none where there is nothing in it.
+/// A text of one line; `None` if empty.
 fn text(name: &str, given: &Option<String>) -> Result<Option<String>, String> {
     let Some(text) = given
         .as_deref()
@@ -161,7 +161,7 @@ mod tests {
         serde_json::from_value(json).unwrap()
     }
 
-    /// The defaults are those that `touchup inspect --help` names.
+    /// The defaults are those in `touchup inspect --help`.
     #[test]
     fn what_is_left_out_is_as_on_the_command_line() {
         let params = request(serde_json::json!({ "nominal": "part" }))

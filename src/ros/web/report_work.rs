@@ -1,4 +1,4 @@
-//! A report from the files of a session: what `touchup inspect` makes of them.
+//! A report from the files of a session, as by `touchup inspect`.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -12,21 +12,21 @@ use crate::inspection::{
 use crate::io::mesh_file::MeshUnit;
 use crate::io::session_folder::{HandedIn, SessionFolder};
 
-/// What was measured of a session that runs: as `~/save_mesh` writes it.
+/// Measurements of the running session, as `~/save_mesh` writes them.
 const SAVED: [&str; 3] = [
     "refined.features.json",
     "refined.touches.csv",
     "refined.ply",
 ];
 
-/// What reports need of the node.
+/// Report inputs from the node.
 #[derive(Debug)]
 pub(super) struct Reports {
-    /// one at a time
+    /// one report at a time
     pub turn: Arc<Semaphore>,
     /// the nominal part of the node
     pub part: Option<PathBuf>,
-    /// of its meshes
+    /// unit of the node's meshes
     pub mesh_unit: MeshUnit,
 }
 
@@ -55,9 +55,9 @@ impl Reports {
 /// Nominal values.
 #[derive(Debug)]
 pub(super) enum NominalFile {
-    /// that were handed in; gone with this
+    /// an uploaded file, removed on drop
     HandedIn(HandedIn),
-    /// of a file that stays
+    /// a permanent file
     File(PathBuf),
 }
 
@@ -70,20 +70,20 @@ impl NominalFile {
     }
 }
 
-/// What a report is made of.
+/// Inputs of a report.
 #[derive(Debug)]
 pub(super) struct ReportWork {
     pub session: SessionFolder,
-    /// it runs: what was saved of it counts, whatever else lies there
+    /// the session runs: only its saved files count
     pub is_current: bool,
     pub nominal: NominalFile,
     pub params: InspectionParams,
-    /// of the meshes of the session
+    /// unit of the session's meshes
     pub mesh_unit: MeshUnit,
 }
 
 impl ReportWork {
-    /// Makes it, and writes its files into the folder of the session.
+    /// Makes the report, and writes its files into the folder of the session.
     ///
     /// # Errors
     /// In the words of `touchup inspect`.
@@ -92,7 +92,7 @@ impl ReportWork {
             .and_then(|files| self.write(&files).map_err(|error| self.in_words(&error)))
     }
 
-    /// Its files; none of them is a link to elsewhere.
+    /// Files of the report; none of them is a link to elsewhere.
     fn files(&self) -> Result<ReportFiles, String> {
         let place = |name: &&str| {
             self.session
@@ -115,7 +115,7 @@ impl ReportWork {
         };
         let mut drawing = PartDrawing::read(self.nominal.path(), &self.params.drawing)?;
         if let NominalFile::HandedIn(file) = &self.nominal {
-            // where it lies now it will not be found again
+            // the report names no temporary file
             drawing.file.path = name_of(file.path());
         }
         let inspected = inspected(&source, &drawing, &self.params)?;
@@ -129,7 +129,7 @@ impl ReportWork {
         )
     }
 
-    /// An error, which names what was handed in as it was called there.
+    /// Error text with the upload's original name.
     fn in_words(&self, error: &InspectionError) -> String {
         let words = error.to_string();
         match &self.nominal {

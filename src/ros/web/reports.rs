@@ -1,4 +1,4 @@
-//! The inspection report of a session: made when an operator asks for it, shown to everybody.
+//! The inspection report of a session: operators make it, everybody may read it.
 
 use std::io;
 use std::sync::Arc;
@@ -27,17 +27,17 @@ use crate::io::session_folder::{HandedIn, SessionFolder, open_file};
 use crate::ros::port::Reply;
 use crate::session::SessionFacts;
 
-/// A report is a document alone: it runs nothing, loads nothing, and leads nowhere.
+/// A report is a document alone: without scripts, external content, and links.
 const POLICY: &str = "sandbox; default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'; \
                       frame-ancestors 'none'";
-/// A file that is handed in goes on within so long …
+/// Time-out for each piece of an upload.
 const PIECE_WITHIN: Duration = Duration::from_secs(20);
-/// … and is whole within so long, which is enough for 1 Mbit/s: others wait for their turn.
+/// Time-out for a whole upload, enough at 1 Mbit/s: others wait for their turn.
 const WHOLE_WITHIN: Duration = Duration::from_secs(600);
-/// The node saves within so long.
+/// Time-out for saving the session.
 const SAVED_WITHIN: Duration = Duration::from_secs(120);
 
-/// Why there is no report.
+/// Reason of a missing report.
 struct Refused(StatusCode, String);
 
 impl Refused {
@@ -50,8 +50,7 @@ impl Refused {
     }
 }
 
-/// Makes a report: `POST /api/reports/SESSION?…`, with the nominal values in its body where they
-/// are handed in.
+/// Makes a report: `POST /api/reports/SESSION?…`, with uploaded nominal values in its body.
 pub(super) async fn make(
     State(site): State<Arc<Site>>,
     headers: HeaderMap,
@@ -77,7 +76,7 @@ pub(super) async fn make(
     }
 }
 
-/// Makes it; whether the session runs, and was saved for it.
+/// Makes the report; returns whether the session runs, and was saved for it.
 async fn report(
     site: &Arc<Site>,
     session: &str,
@@ -135,7 +134,7 @@ async fn report(
     made.map(|()| is_current).map_err(Refused::bad)
 }
 
-/// What is handed in, unless it takes too long.
+/// The upload, within its time-out.
 async fn whole_within<F: Future<Output = Result<HandedIn, Refused>>>(
     file: F,
 ) -> Result<HandedIn, Refused> {
@@ -148,7 +147,7 @@ async fn whole_within<F: Future<Output = Result<HandedIn, Refused>>>(
     timeout(WHOLE_WITHIN, file).await.map_err(late)?
 }
 
-/// Takes in the body of a request, piece by piece.
+/// Receives the body of a request, piece by piece.
 async fn handed_in(
     session: &SessionFolder,
     asked: &ReportRequest,
@@ -192,7 +191,7 @@ async fn handed_in(
     }
 }
 
-/// Has the node save what it knows.
+/// Makes the node save its session.
 async fn save(site: &Site) -> Result<(), Refused> {
     let (to, saved) = oneshot::channel();
     let request = json!({ "overwrite": true, "with_features": true });
@@ -216,7 +215,7 @@ async fn save(site: &Site) -> Result<(), Refused> {
     }
 }
 
-/// Shows a report: `GET /api/reports/SESSION`.
+/// Serves a report: `GET /api/reports/SESSION`.
 pub(super) async fn show(
     State(site): State<Arc<Site>>,
     headers: HeaderMap,

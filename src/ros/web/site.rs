@@ -1,5 +1,4 @@
-//! What all pages share: what they are shown, who may ask what, and what the page answers by
-//! itself.
+//! State that all pages share: content, access, and the page's own calls.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -20,11 +19,11 @@ use crate::mesh::{FaceTree, TriMesh};
 use crate::ros::inbox::Inbox;
 use crate::ros::stop::Motion;
 
-/// Why a call is refused where a session is replayed.
+/// Reason of a refused call during a replay.
 const REPLAYED: &str =
     "this page replays a session, in which nothing can be changed: open the page of the node";
 
-/// What all pages share.
+/// State that all pages share.
 pub(super) struct Site {
     pub board: Board,
     pub calls: Calls,
@@ -37,9 +36,9 @@ pub(super) struct Site {
     /// with the tree over its faces
     pub scan_mesh: Arc<(TriMesh, FaceTree)>,
     pub session_folder: PathBuf,
-    /// pages that are open
+    /// number of open pages
     pub pages: AtomicUsize,
-    /// of a session that is replayed, how that goes on; then it is all that a page may ask for
+    /// control of a replay, which is then the only service of the page
     pub replay: Option<Arc<ReplayControl>>,
 }
 
@@ -47,8 +46,8 @@ pub(super) struct Site {
 pub(super) struct ScanShown {
     pub file: String,
     pub faces: usize,
-    /// whether the page need not ask how large it is: an operator has just said so, or the session
-    /// was touched at this size
+    /// whether the page need not ask for the size: an operator has just confirmed it, or the
+    /// session has touches at this size
     pub is_size_confirmed: bool,
 }
 
@@ -74,7 +73,7 @@ pub(super) struct SiteState<'a> {
 }
 
 impl Site {
-    /// The topic `state` as it is for a page now.
+    /// The present topic `state` for a page.
     pub fn state(&self, role: Role) -> SiteState<'_> {
         let stops = self.inbox.stops();
         let arm = stops
@@ -99,7 +98,7 @@ impl Site {
         }
     }
 
-    /// A call of a page: of the page's own, or of a service of the node.
+    /// Calls a service of the page itself, or of the node.
     pub fn call(&self, role: Role, name: &str, request: Value, reply: Answer) {
         if let Some(replay) = &self.replay {
             return reply.send(match name {
@@ -146,5 +145,5 @@ impl Site {
     }
 }
 
-/// What the page itself is asked, and not the node.
+/// A call that the page answers, not the node.
 type OwnCall = fn(&Site, Value) -> Result<Value, String>;

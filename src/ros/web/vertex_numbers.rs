@@ -1,22 +1,20 @@
-//! A number for each of some vertices, as a binary message: what the page colours by, beside what
-//! is in a `MeshPatch`.
+//! A number for each of some vertices, as a binary message: colours of the page beyond `MeshPatch`.
 
 /// Kind of the message.
 const VERTEX_NUMBERS: u8 = 2;
 
-/// Which number.
+/// Quantity of the numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum VertexNumber {
-    /// deviation from the nominal part, m; NaN where that is far
+    /// deviation from the nominal part, m; NaN beyond reach
     Deviation = 1,
     /// standard uncertainty along the normal, m
     Sigma = 2,
-    /// 1 where a contact nearby was rejected; the vertices that are not named have none
+    /// 1 near a rejected contact; vertices that are not named have none
     Outlier = 3,
 }
 
-/// The kind, which number, two zeros; how many, their vertices as u32, their numbers as f32; little
-/// endian.
+/// Header: kind, quantity, two zeros, count; then vertices as u32, numbers as f32; little endian.
 pub(super) fn frame(which: VertexNumber, numbers: impl Iterator<Item = (u32, f32)>) -> Vec<u8> {
     let (vertices, numbers): (Vec<u32>, Vec<f32>) = numbers.unzip();
     let mut frame = Vec::with_capacity(8 + 8 * vertices.len());

@@ -1,4 +1,4 @@
-//! How a replay goes on, and how far it is: pages set it, and the player follows.
+//! Pace and progress of a replay: pages set it, and the player follows.
 
 use std::sync::{Condvar, Mutex, MutexGuard};
 use std::time::Duration;
@@ -10,7 +10,7 @@ use super::shown::{ReplayRequest, ReplayShown};
 use crate::clock::Clock;
 use crate::ros::locked;
 
-/// Shared by the pages of a replay and its player.
+/// Control that the pages of a replay share with its player.
 #[derive(Debug)]
 pub(in crate::ros::web) struct ReplayControl {
     session: String,
@@ -20,7 +20,7 @@ pub(in crate::ros::web) struct ReplayControl {
 }
 
 impl ReplayControl {
-    /// Before anything is read.
+    /// State before reading.
     ///
     /// - `session`: its name.
     pub fn new(session: &str, clock: Clock) -> Self {
@@ -37,7 +37,7 @@ impl ReplayControl {
         &self.session
     }
 
-    /// The topic `replay` as it is now.
+    /// The present topic `replay`.
     pub fn shown(&self) -> ReplayShown {
         locked(&self.progress).shown(&self.session)
     }
@@ -45,7 +45,7 @@ impl ReplayControl {
     /// Answers `~/replay`.
     ///
     /// # Errors
-    /// In words: what is wrong with the request; then nothing is changed.
+    /// In words: an invalid request, which changes nothing.
     pub fn call(&self, request: Value) -> Result<Value, String> {
         let request = ReplayRequest::read(request)?;
         let mut progress = locked(&self.progress);
@@ -60,27 +60,27 @@ impl ReplayControl {
         Ok(json!({ "success": true, "message": "" }))
     }
 
-    /// Nobody looks any more.
+    /// Ends the replay: no page follows it.
     pub fn close(&self) {
         locked(&self.progress).is_closed = true;
         self.changed.notify_all();
     }
 
-    /// Whether nobody looks any more.
+    /// Whether no page follows the replay.
     pub(super) fn is_closed(&self) -> bool {
         locked(&self.progress).is_closed
     }
 
-    /// All is read.
+    /// Reading is complete.
     ///
     /// - `end_ns`: time of the last message.
-    /// - `damage`: where the recording is damaged, and ends.
+    /// - `damage`: position of damage, at which the recording ends.
     pub(super) fn begin(&self, end_ns: i64, damage: Option<String>) {
         let mut progress = locked(&self.progress);
         (progress.is_ready, progress.end_ns, progress.damage) = (true, end_ns, damage);
     }
 
-    /// It does not go on: says why, and returns when nobody looks any more.
+    /// Stops with an error; returns when no page follows the replay.
     pub(super) fn fail(&self, why: String) {
         let mut progress = locked(&self.progress);
         progress.error = Some(why);
@@ -107,7 +107,7 @@ impl ReplayControl {
         }
     }
 
-    /// The last message was taken: returns when it is to begin again, or nobody looks any more.
+    /// After the last message: returns when the replay restarts, or no page follows it.
     pub(super) fn wait_at_end(&self) -> ReplayNext {
         let mut progress = locked(&self.progress);
         progress.is_at_end = true;
@@ -156,7 +156,7 @@ mod tests {
         assert_eq!(control.call(request).unwrap()["success"], true);
     }
 
-    /// What a message of a time does, once it is known.
+    /// Result for a message of a time, once decided.
     fn waiting(
         control: &Arc<ReplayControl>,
         hand: &ManualClock,
@@ -225,7 +225,7 @@ mod tests {
             (0.0, Some(10.5), true)
         );
         assert_eq!(control.wait_for(10 * S), ReplayNext::Go);
-        // beyond the end is the end; from there it goes back to the beginning
+        // times beyond the end are the end; the replay then goes back to the beginning
         set(&control, json!({ "is_paused": false, "at_s": 1e300 }));
         assert_eq!(control.wait_for(99 * S), ReplayNext::Go);
         set(&control, json!({ "at_s": 0 }));

@@ -1,4 +1,4 @@
-//! One page that looks at a replay.
+//! One page that follows a replay.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -14,12 +14,12 @@ use crate::ros::web::connection;
 use crate::ros::web::page_place::PagePlace;
 use crate::ros::web::site::Site;
 
-/// So often a page hears that the session is still being read.
+/// Interval of progress messages while the session loads.
 const SIGN_OF_LIFE: Duration = Duration::from_secs(2);
-/// A page that takes nothing for so long has gone.
+/// Time-out for a page that accepts nothing.
 const GONE_AFTER: Duration = Duration::from_secs(20);
 
-/// Serves a page of a replay until it goes; one that there cannot be is refused with the reason.
+/// Serves a page of a replay until it disconnects; a refused page gets the reason.
 pub(in crate::ros::web) async fn serve(mut socket: WebSocket, replays: &Replays, session: &str) {
     let replay = match replays.join(session) {
         Ok(replay) => replay,
@@ -39,17 +39,17 @@ pub(in crate::ros::web) async fn serve(mut socket: WebSocket, replays: &Replays,
             )
             .await
         }
-        // in a replay nobody operates
+        // a replay has no operator
         Some(place) => {
             connection::serve(socket, site, Role::Look).await;
             drop(place);
         }
     }
-    // it ends here where nobody else looks
+    // the last page ends the replay
     drop(replay);
 }
 
-/// What the page is shown, once the session is read; `None`: the page has gone.
+/// Content of the replay, once loaded; `None`: the page has disconnected.
 async fn opened(socket: &mut WebSocket, replay: &Replay) -> Option<Result<Arc<Site>, String>> {
     let mut opened = replay.opened.clone();
     loop {
@@ -70,12 +70,12 @@ async fn refuse(socket: &mut WebSocket, session: &str, why: String) {
         .await
         .is_some()
     {
-        // it may have gone meanwhile
+        // the page may have disconnected meanwhile
         let _ = timeout(GONE_AFTER, socket.send(Message::Close(None))).await;
     }
 }
 
-/// Whether the page has taken it.
+/// Whether the page has received the message.
 async fn say(socket: &mut WebSocket, shown: &ReplayShown) -> Option<()> {
     let text = text_of("replay", shown)?;
     timeout(GONE_AFTER, socket.send(Message::text(text)))

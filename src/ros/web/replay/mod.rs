@@ -1,9 +1,8 @@
-//! A session that was recorded, touched again before the eyes of who looks: a node of its own,
-//! without a network, takes its messages as they came, and pages see it as they see the one that
-//! runs.
+//! Replay of a recorded session: a node of its own, without a network, gets the recorded messages
+//! at their times, and pages show it like the running node.
 //!
-//! Pages of one session share its replay, which goes with the last of them. Its threads yield to
-//! those of the node that runs.
+//! Pages of one session share its replay, which ends with the last of them. Its threads yield to
+//! those of the running node.
 
 mod control;
 mod follow;

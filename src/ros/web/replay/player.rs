@@ -1,5 +1,5 @@
-//! Plays a session: reads it, begins a node for it, gives that its messages, and ends both when
-//! nobody looks any more.
+//! Player of a session: reads it, starts a node for it, sends its messages, and ends both when no
+//! page follows.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -29,19 +29,19 @@ use crate::ros::web::site::{ScanShown, Site};
 use crate::session::SessionRecord;
 use crate::stylus::Message;
 
-/// Messages that wait for the node at most: a pause, and another place, are obeyed after them.
+/// Maximum number of queued messages: pauses and jumps take effect after them.
 const INBOX: usize = 256;
-/// Why it goes no further when the node is gone.
+/// Reason of the end if the node is gone.
 const ENDED: &str =
     "the replay ended by a fault of touchup: please report it with the session's folder";
 
-/// What the pages of a replay are shown, once it is there; why there is none.
+/// Content of a replay once open, or the reason of its failure.
 pub(super) type OpenedReplay = Option<Result<Arc<Site>, String>>;
 
-/// What it takes to play a session.
+/// Inputs of a replay.
 pub(super) struct Player {
     pub folder: SessionFolder,
-    /// in which all sessions lie
+    /// parent of the session folders
     pub session_folder: PathBuf,
     pub entrance: Arc<Entrance>,
     pub control: Arc<ReplayControl>,
@@ -49,7 +49,7 @@ pub(super) struct Player {
     pub opened: watch::Sender<OpenedReplay>,
 }
 
-/// What plays.
+/// A running replay.
 struct ReplayStage {
     recording: SessionRecording,
     site: Arc<Site>,
@@ -59,7 +59,7 @@ struct ReplayStage {
 }
 
 impl Player {
-    /// Plays until nobody looks any more.
+    /// Plays until no page follows.
     pub fn run(self) {
         let Self {
             control,
@@ -89,7 +89,7 @@ impl Player {
         }
     }
 
-    /// Reads the session, and begins a node that is to take it.
+    /// Reads the session, and starts its node.
     #[expect(clippy::too_many_lines)]
     fn open(&self) -> Result<ReplayStage, String> {
         let Self {
@@ -118,8 +118,8 @@ impl Player {
         });
         let readable =
             read.map_err(|error| format!("the recording cannot be replayed: {error}"))?;
-        // of a session that goes on: after its messages, so that what was undone before one of them
-        // is not missing
+        // for a running session: read after its messages, so that no undo before one of them is
+        // missing
         let changes =
             SessionRecord::strokes_of(folder.path()).map_err(|error| error.to_string())?;
         let parameters = [
@@ -154,7 +154,7 @@ impl Player {
             calls: Calls::new(&inbox).map_err(|error| error.to_string())?,
             inbox: inbox.clone(),
             entrance: Arc::clone(entrance),
-            // none are read: features are found anew, and may get other numbers
+            // none are read: a replay detects features anew, perhaps with other numbers
             annotations: Annotations::new(session_folder),
             nominal: None,
             reports: Reports::new(None, mesh_unit),
@@ -194,7 +194,7 @@ fn path(path: &Path) -> Result<ParameterValue, String> {
     Ok(ParameterValue::String(text.to_owned()))
 }
 
-/// Plays from the beginning, and again whenever it is to, until nobody looks.
+/// Plays from the beginning, and again on request, until no page follows.
 fn play(
     recording: &SessionRecording,
     control: &ReplayControl,

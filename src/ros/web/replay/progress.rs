@@ -1,24 +1,24 @@
-//! How far a replay is, and when its next message is due.
+//! Progress of a replay, and due times of its messages.
 
 use std::time::{Duration, Instant};
 
 use super::shown::{ReplayRequest, ReplayShown};
 
-/// Longest wait without a look at the clock; whatever changes ends it at once.
+/// Maximum wait between clock readings; changes end it at once.
 pub(super) const LOOK: Duration = Duration::from_secs(60);
 
-/// What a message that waits for its time is to do.
+/// Next action of the player.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum ReplayNext {
-    /// now
+    /// send the message
     Go,
-    /// the replay begins again
+    /// restart the replay
     Again,
-    /// nobody looks any more
+    /// end: no page follows
     Closed,
 }
 
-/// A replay's pace and place. Times are those along the recording without its long pauses, ns.
+/// Pace and position of a replay. Times are along the recording without its long pauses, ns.
 #[derive(Debug)]
 pub(super) struct ReplayProgress {
     pub is_ready: bool,
@@ -32,14 +32,14 @@ pub(super) struct ReplayProgress {
     pub error: Option<String>,
     pub starts_again: bool,
     pub is_closed: bool,
-    /// from when and where on it plays at this speed, once it does
+    /// start of the present pace: clock and position
     pace: Option<(Instant, i64)>,
-    /// times that something was set
+    /// number of changes
     pub changes: u64,
 }
 
 impl Default for ReplayProgress {
-    /// Nothing is read yet; it will play at the recorded speed.
+    /// Before reading, at the recorded speed.
     fn default() -> Self {
         Self {
             is_ready: false,
@@ -60,9 +60,9 @@ impl Default for ReplayProgress {
 }
 
 impl ReplayProgress {
-    /// The topic `replay` of a session of this name.
+    /// The topic `replay` of a session.
     pub fn shown(&self, session: &str) -> ReplayShown {
-        // in tenths, so that a page hears no more often than it can show
+        // in tenths, to send visible changes only
         let seconds = |ns: i64| (ns as f64 * 1e-8).round() / 10.0;
         ReplayShown {
             session: session.to_owned(),
@@ -78,7 +78,7 @@ impl ReplayProgress {
         }
     }
 
-    /// Goes on as pages want it.
+    /// Applies the request of a page.
     pub fn set(
         &mut self,
         ReplayRequest {
@@ -91,7 +91,7 @@ impl ReplayProgress {
         self.is_paused = is_paused.unwrap_or(self.is_paused);
         if let Some(at_s) = at_s {
             let at_ns = ((at_s * 1e9) as i64).min(self.end_ns);
-            // a mesh does not go back: it is touched again from the scan on
+            // a mesh does not go back: the replay restarts from the scan
             self.starts_again |= at_ns < self.at_ns;
             self.target_ns = Some(at_ns);
         }
@@ -99,7 +99,7 @@ impl ReplayProgress {
         self.changes += 1;
     }
 
-    /// Whether what plays is to be left.
+    /// Whether the present playback ends.
     pub fn left(&mut self) -> Option<ReplayNext> {
         if self.is_closed {
             return Some(ReplayNext::Closed);
@@ -111,7 +111,7 @@ impl ReplayProgress {
         Some(ReplayNext::Again)
     }
 
-    /// For how long the message of a time has to wait; `None`: not at all.
+    /// Wait before the message of a time; `None`: send it now.
     pub fn wait_until(&mut self, at_ns: i64, now: Instant) -> Option<Duration> {
         if let Some(target_ns) = self.target_ns {
             if at_ns < target_ns {

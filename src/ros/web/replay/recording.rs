@@ -1,4 +1,4 @@
-//! The recording of a session, to be played again and again.
+//! Recording of a session, for repeated playback.
 
 use std::path::PathBuf;
 
@@ -7,32 +7,32 @@ use crate::replay::Recording;
 use crate::ros::playback::{PlayedTime, wrench_frame_id};
 use crate::stylus::Message;
 
-/// So often while it is read somebody is asked whether it is still wanted, in messages.
+/// Number of messages between checks for cancellation.
 const ASK_EVERY: u64 = 4096;
 
-/// A recording of which it is known how long it is.
+/// A recording with known length.
 #[derive(Debug)]
 pub(super) struct SessionRecording {
     path: PathBuf,
     topics: Topics,
     /// frame of the headers of its wrenches
     pub wrench_frame: String,
-    /// messages that were there when it was read: a session that runs goes on
+    /// number of messages at reading: a running session goes on
     pub message_count: u64,
-    /// time of the last one, ns
+    /// time of the last message, ns
     pub end_ns: i64,
-    /// where it is damaged, and that it ends there
+    /// position of damage, at which it ends
     pub damage: Option<String>,
 }
 
 impl SessionRecording {
-    /// Reads it once, from its first message to its last.
+    /// Reads the recording once, from its first message to its last.
     ///
-    /// - `source`: who touched, `stylus` or `probe`.
-    /// - `is_wanted`: `false`: what is left of it does not matter.
+    /// - `source`: the tool, `stylus` or `probe`.
+    /// - `is_wanted`: `false` cancels the reading.
     ///
     /// # Errors
-    /// [`RecordingError`] where nothing of it can be read.
+    /// [`RecordingError`] if nothing is readable.
     pub fn read(
         path: PathBuf,
         topics: Topics,
@@ -66,10 +66,10 @@ impl SessionRecording {
         Ok(recording)
     }
 
-    /// Its messages, each with its time, ns.
+    /// The messages, each with its time, ns.
     ///
     /// # Errors
-    /// As [`Self::read`]: of what was readable then.
+    /// As [`Self::read`]: for the part readable then.
     pub fn messages(
         &self,
     ) -> Result<impl Iterator<Item = Result<(i64, Message), RecordingError>> + use<>, RecordingError>

@@ -1,4 +1,4 @@
-//! The replays that pages look at: few at a time, each for as long as one of them does.
+//! The running replays: few at a time, each until its last page leaves.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -17,13 +17,13 @@ use crate::ros::locked;
 use crate::ros::web::background;
 use crate::ros::web::entrance::Entrance;
 
-/// Replays at a time at most: each has scan, mesh and touches in memory.
+/// Maximum number of replays: each has scan, mesh and touches in memory.
 const MOST_REPLAYS: usize = 2;
-/// One that nobody looks at any more is gone within so long.
+/// Time-out for the end of a replay without pages.
 const GONE_WITHIN: Duration = Duration::from_secs(30);
 const BUSY: &str = "two sessions are being replayed already: close the pages of one of them";
 
-/// A replay, for as long as somebody looks at it.
+/// A replay, until its last page leaves.
 pub(super) struct Replay {
     pub control: Arc<ReplayControl>,
     pub opened: watch::Receiver<OpenedReplay>,
@@ -35,7 +35,7 @@ impl Drop for Replay {
     }
 }
 
-/// All of them.
+/// The running replays.
 #[derive(Debug)]
 pub(in crate::ros::web) struct Replays {
     entrance: Arc<Entrance>,
@@ -43,14 +43,14 @@ pub(in crate::ros::web) struct Replays {
     runtime: Handle,
     /// by session
     running: Mutex<BTreeMap<String, Weak<Replay>>>,
-    /// in memory, also of those that end
+    /// places in memory, also of ending replays
     places: Arc<Semaphore>,
 }
 
 impl Replays {
-    /// None yet.
+    /// No replay yet.
     ///
-    /// - `session_folder`: in which sessions lie.
+    /// - `session_folder`: parent of the session folders.
     pub fn new(entrance: &Arc<Entrance>, session_folder: &Path, runtime: &Handle) -> Arc<Self> {
         Arc::new(Self {
             entrance: Arc::clone(entrance),
@@ -61,10 +61,10 @@ impl Replays {
         })
     }
 
-    /// The replay of a session: that which others look at, or a new one.
+    /// The replay of a session: the running one, or a new one.
     ///
     /// # Errors
-    /// In words: there is no such session, or there are so many replays already.
+    /// In words: no such session, or too many replays.
     pub(super) fn join(&self, session: &str) -> Result<Arc<Replay>, String> {
         let mut running = locked(&self.running);
         running.retain(|_, replay| replay.strong_count() > 0);
@@ -94,7 +94,7 @@ impl Replays {
         };
         let places = Arc::clone(&self.places);
         self.runtime.spawn(async move {
-            // one that just ends has its memory still
+            // an ending replay still has its memory
             let Ok(Ok(place)) = timeout(GONE_WITHIN, places.acquire_owned()).await else {
                 return drop(player.opened.send_replace(Some(Err(BUSY.to_owned()))));
             };
@@ -103,7 +103,7 @@ impl Replays {
                 drop(place);
             };
             if let Err(error) = background::begin("replay", play) {
-                // who waits sees that nothing comes any more
+                // waiting pages see the closed channel
                 tracing::warn!(%error, "there is no thread for a replay");
             }
         });

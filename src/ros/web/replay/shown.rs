@@ -1,4 +1,4 @@
-//! What pages are shown of a replay, and what they set of it.
+//! Messages between pages and a replay.
 
 use std::ops::RangeInclusive;
 
@@ -8,7 +8,7 @@ use serde_json::Value;
 /// Multiples of the recorded speed.
 const SPEEDS: RangeInclusive<f64> = 0.1..=100.0;
 
-/// The topic `replay`. Times are those along the recording without its long pauses, s.
+/// The topic `replay`. Times are along the recording without its long pauses, s.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub(in crate::ros::web) struct ReplayShown {
     /// name of the session
@@ -19,18 +19,18 @@ pub(in crate::ros::web) struct ReplayShown {
     pub is_paused: bool,
     pub at_s: f64,
     pub end_s: f64,
-    /// where it runs ahead to, as fast as it can; `None`: it plays
+    /// target of a jump, as fast as possible; `None`: it plays
     pub target_s: Option<f64>,
-    /// all has come
+    /// all messages have come
     pub is_at_end: bool,
-    /// where the recording is damaged, and ends
+    /// position of damage, at which the recording ends
     pub damage: Option<String>,
-    /// why it does not go on
+    /// reason of a stop
     pub error: Option<String>,
 }
 
 impl ReplayShown {
-    /// There is none.
+    /// A refused replay.
     pub fn refused(session: &str, why: String) -> Self {
         Self {
             session: session.to_owned(),
@@ -40,7 +40,7 @@ impl ReplayShown {
     }
 }
 
-/// The request of `~/replay`: what is left out stays as it is.
+/// The request of `~/replay`; a missing field keeps its value.
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ReplayRequest {
@@ -50,10 +50,10 @@ pub(super) struct ReplayRequest {
 }
 
 impl ReplayRequest {
-    /// Reads it.
+    /// Parses a request.
     ///
     /// # Errors
-    /// In words: what is wrong with it.
+    /// In words: an invalid value.
     pub fn read(request: Value) -> Result<Self, String> {
         let request: Self =
             serde_json::from_value(request).map_err(|error| format!("~/replay: {error}"))?;

@@ -1,4 +1,4 @@
-//! Work beside the server, which answers meanwhile.
+//! Background work of the setup, while the server goes on.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::thread::Builder;
@@ -7,7 +7,7 @@ use super::setup_state::NodeSetupError;
 
 /// Starts a thread.
 ///
-/// - `what`: is to be done, in words.
+/// - `what`: the work, in words.
 ///
 /// # Errors
 /// [`NodeSetupError::Refused`]: the system gives no thread.
@@ -24,7 +24,7 @@ pub(super) fn beside(
     })
 }
 
-/// What comes of work beside: nobody waits for what ended by a fault.
+/// Result of background work; a panic becomes an error, so that nobody waits for it.
 pub(super) fn to_its_end<T>(work: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
     let fault = || {
         "a fault of touchup ended this: please report it with the file, and choose another one"

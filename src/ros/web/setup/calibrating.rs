@@ -1,5 +1,5 @@
-//! Calibrations from recordings of the folder: made beside, shown, and put into the scene when an
-//! operator says so.
+//! Calibrations from recordings of the folder: computed in the background, shown, and written to
+//! the scene on an operator's request.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -21,20 +21,20 @@ use crate::io::scan_folder::FolderFileKind;
 use crate::ros::locked;
 use crate::scene::Scene;
 
-/// Messages between two looks at how far it is.
+/// Number of messages between updates of the progress.
 const MESSAGES_PER_LOOK: u64 = 2000;
 const NO_RESULT: NodeSetupError = NodeSetupError::NotNow(
     "there is no such result that could be used: make the calibration, and look at what it found",
 );
 
-/// What a calibration is made from.
+/// Request of a calibration.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct CalibrateRequest {
     what: CalibrationKind,
-    /// of the folder
+    /// recording in the folder
     recording: Option<String>,
-    /// a table of points picked on the scan; without a recording also of those in space
+    /// a table of points picked on the scan; without a recording also with points in space
     points: Option<String>,
 }
 
@@ -47,7 +47,7 @@ struct CalibrationInputs {
 }
 
 impl NodeSetup {
-    /// Makes a calibration beside.
+    /// Computes a calibration in the background.
     ///
     /// # Errors
     /// [`NodeSetupError`]
@@ -85,7 +85,7 @@ impl NodeSetup {
         let scene = {
             let mut state = self.idle()?;
             self.take_edits(&mut state)?;
-            // where it dwells on a point is found by the ball
+            // the ball is needed to find dwells on points
             if what == CalibrationKind::Scan && recording.is_some() && !state.has_tip() {
                 return Err(NO_TIP);
             }
@@ -136,7 +136,7 @@ impl NodeSetup {
             .inspect_err(|_| locked(&self.state).calibration = CalibrationChoice::None)
     }
 
-    /// Puts what a calibration found into the scene.
+    /// Writes the result of a calibration to the scene.
     ///
     /// # Errors
     /// [`NodeSetupError`]
@@ -155,7 +155,7 @@ impl NodeSetup {
         if let CalibrationChoice::Found(facts) = &mut state.calibration {
             facts.is_used = true;
         }
-        // an older look at a recording was one with the older scene
+        // an older check of a recording used the older scene
         state.forget_check();
         Ok(())
     }
@@ -166,7 +166,7 @@ impl NodeSetup {
         }
     }
 
-    /// An error, which names files as the folder does.
+    /// An error with file names relative to the folder.
     fn in_words(&self, error: &CalibrationError) -> String {
         error
             .to_string()
@@ -174,9 +174,9 @@ impl NodeSetup {
     }
 }
 
-/// Makes a calibration.
+/// Computes a calibration.
 ///
-/// - `at_share`: called now and then with the share of the recording that has been read.
+/// - `at_share`: gets the share of the recording read, now and then.
 fn calibrated(
     inputs: &CalibrationInputs,
     topics: &Topics,
@@ -216,7 +216,7 @@ fn calibrated(
             found.map(|found| found.map(FoundCalibration::Payload))
         }
         (_, recording) => {
-            // whoever asks names a table of points
+            // the request names a table of points
             let points = points.as_deref().unwrap_or(Path::new(""));
             let found = calibrate_scan(points, recording, scene, None, &mut at_each);
             found.map(|found| found.map(FoundCalibration::Scan))

@@ -1,4 +1,4 @@
-//! A recording of touches that is looked at before the node begins.
+//! Check of a recording of touches before the node starts.
 
 use std::sync::Arc;
 
@@ -12,8 +12,8 @@ use crate::ros::locked;
 use crate::scene::Scene;
 
 impl NodeSetup {
-    /// Has a recording of the folder looked at beside, on the scan and with the tip that were
-    /// chosen; `None`: somebody has seen what was found, or does without it.
+    /// Checks a recording of the folder in the background, on the chosen scan with the chosen tip;
+    /// `None`: an operator has seen the findings, or goes on without a check.
     ///
     /// # Errors
     /// [`NodeSetupError`]

@@ -1,4 +1,4 @@
-//! What an operator chooses, up to the start of the node.
+//! Choices of an operator, up to the start of the node.
 
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ use crate::io::scan_folder::FolderFileKind;
 use crate::ros::locked;
 
 impl NodeSetup {
-    /// Chooses a scan of the folder, which is then read beside; the unit has to be said anew.
+    /// Chooses a scan of the folder, and reads it in the background; the unit must be chosen anew.
     ///
     /// # Errors
     /// [`NodeSetupError`]
@@ -43,7 +43,7 @@ impl NodeSetup {
             .inspect_err(|_| locked(&self.state).scan = ScanChoice::None)
     }
 
-    /// Says the unit of the scan.
+    /// Chooses the unit of the scan.
     ///
     /// # Errors
     /// [`NodeSetupError`]
@@ -86,7 +86,7 @@ impl NodeSetup {
         Ok(())
     }
 
-    /// Writes the scene, and has the node start.
+    /// Writes the scene, and starts the node.
     ///
     /// # Errors
     /// [`NodeSetupError`]

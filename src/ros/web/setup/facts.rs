@@ -1,4 +1,4 @@
-//! What somebody who chose a scan is shown of it, so that its unit can be said.
+//! Facts about a scan, for the choice of its unit.
 
 use std::path::Path;
 
@@ -8,42 +8,40 @@ use crate::io::mesh_file::{LARGEST_M, MeshFileError, MeshUnit, SMALLEST_M};
 use crate::mesh::RepairReport;
 use crate::scan::{Scan, ScanError, read_scan};
 
-/// Longest side of a usual work-piece, m: the first unit in which the scan is of such a size is
-/// suggested.
+/// Longest side of a usual work-piece, m: the first unit with such a size becomes the suggestion.
 const USUAL: std::ops::RangeInclusive<f64> = 10e-3..=2.0;
-/// The order in which a unit is suggested: scanners write mm, others m, and inches where neither
-/// makes sense.
+/// Order of suggested units: scanners write mm, others m, and inches if neither makes sense.
 const SUGGESTED: [MeshUnit; 3] = [MeshUnit::Millimetre, MeshUnit::Metre, MeshUnit::Inch];
 
-/// A scan as it is in its file.
+/// A scan as in its file.
 #[derive(Clone, Debug, Serialize)]
 pub(super) struct ScanFacts {
     pub file: String,
     pub faces: usize,
-    /// whether a surface was made through points
+    /// whether the surface comes from points
     is_of_points: bool,
     repair: RepairReport,
     pub units: Vec<UnitChoice>,
 }
 
-/// How large it is if its coordinates are in a unit.
+/// Size of the scan if its coordinates are in a unit.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(super) struct UnitChoice {
     pub unit: &'static str,
     /// along x, y and z of the scan, m
     sides_m: [f64; 3],
-    /// whether a work-piece can be so large
+    /// whether the size is possible for a work-piece
     pub is_plausible: bool,
-    /// whether it is more likely than the others
+    /// whether it is the most likely unit
     is_likely: bool,
 }
 
-/// Reads a scan in whichever unit gives it a size that can be.
+/// Reads a scan in the first unit with a plausible size.
 ///
-/// - `stated`: the unit that a scene or a parameter names.
+/// - `stated`: the unit in a scene or a parameter.
 ///
 /// # Errors
-/// In words: why it cannot be used, and what to do.
+/// In words: the reason of the failure, and a remedy.
 pub(super) fn read_facts(
     path: &Path,
     file: &str,
@@ -86,7 +84,7 @@ fn read_in_any(path: &Path) -> Result<(MeshUnit, Scan), ScanError> {
             Err(other) => return Err(other),
         }
     }
-    // the last unit's refusal; there is one where no unit was taken
+    // the last unit's refusal, set unless a unit was plausible
     refused.map_or_else(
         || read_scan(path, MeshUnit::default()).map(|scan| (MeshUnit::default(), scan)),
         Err,
@@ -135,7 +133,7 @@ mod tests {
         assert_eq!(likely(0.127, None), ["m"]);
         assert_eq!(likely(5.0, None), ["inch"]);
         assert_eq!(likely(5.0, Some(MeshUnit::Millimetre)), ["mm"]);
-        // in metres it would reach farther than any arm
+        // in metres it would exceed the reach of any arm
         assert_eq!(likely(127.0, Some(MeshUnit::Metre)), ["mm"]);
         assert!(likely(1e9, None).is_empty());
     }

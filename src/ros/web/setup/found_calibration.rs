@@ -1,4 +1,4 @@
-//! What a calibration on the page found, whichever it was.
+//! Result of any calibration on the page.
 
 use std::fmt;
 

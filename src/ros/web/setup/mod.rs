@@ -1,5 +1,5 @@
-//! Before there is a node: the scan, its unit and the tip are chosen on the page, step by step, the
-//! sensors are calibrated and looked at by recordings, and the node begins from there.
+//! Setup before a node: operators choose the scan, its unit and the tip on the page, calibrate the
+//! sensors and check them by recordings, and start the node.
 
 mod beside;
 mod calibrating;

@@ -1,5 +1,4 @@
-//! The steps before a node: what was chosen so far, by whomever operates, and what the node began
-//! with or why it did not.
+//! Setup of a node: the choices of all operators, and the scene or the failure of its start.
 
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
@@ -17,29 +16,28 @@ use crate::ros::locked;
 use crate::ros::web::access::Role;
 use crate::ros::web::error::WebError;
 
-/// Bytes of an upload at most.
+/// Maximum size of an upload, bytes.
 pub(super) const LARGEST_UPLOAD: u64 = 2 << 30;
 /// Name of the scene in the folder of scans, without its extension.
 const SCENE: &str = "scene";
 
-/// What a setup begins with.
+/// Parameters of a setup.
 #[derive(Clone, Debug)]
 pub struct SetupParams {
-    /// where scans lie, and where the scene and what is uploaded goes
+    /// folder of the scans, the scene and uploads
     pub folder: PathBuf,
-    /// the scene to begin with; `None`: `scene.yaml` of the folder where there is one, else the
-    /// usual one
+    /// the initial scene; `None`: `scene.yaml` of the folder if present, else the default one
     pub scene: Option<PathBuf>,
-    /// of the ball, as somebody stated it, mm
+    /// stated radius of the ball, mm
     pub radius_mm: Option<f64>,
-    /// of poses and wrenches in recordings
+    /// topics of poses and wrenches in recordings
     pub topics: Topics,
 }
 
 /// The setup of a node, which pages work on together.
 pub struct NodeSetup {
     pub(super) folder: ScanFolder,
-    /// where the scene will be
+    /// file of the new scene
     pub(super) target: PathBuf,
     known_radius_mm: Option<f64>,
     pub(super) topics: Topics,
@@ -49,7 +47,7 @@ pub struct NodeSetup {
 
 impl NodeSetup {
     /// # Errors
-    /// [`WebError::Setup`]: the folder or the scene cannot be used.
+    /// [`WebError::Setup`]: an unusable folder or scene.
     pub fn new(params: SetupParams) -> Result<Self, WebError> {
         let SetupParams {
             folder: path,
@@ -100,8 +98,7 @@ impl NodeSetup {
         })
     }
 
-    /// Waits until somebody starts the node: the scene to start it with, which names the scan and
-    /// its unit.
+    /// Waits for the start by an operator: returns the scene, which names the scan and its unit.
     pub fn wait(&self) -> PathBuf {
         let mut state = locked(&self.state);
         while state.stage != Stage::Starting {
@@ -113,19 +110,19 @@ impl NodeSetup {
         self.target.clone()
     }
 
-    /// The node did not start: somebody may choose again.
+    /// The node did not start: operators may choose again.
     ///
-    /// - `step`: that can mend it; `why`: in words.
+    /// - `step`: the remedy; `why`: in words.
     pub fn refuse(&self, step: SetupStep, why: String) {
         let mut state = locked(&self.state);
         state.stage = Stage::Choosing;
         state.failure = Some(SetupFailure { step, why });
     }
 
-    /// What a page is shown; it looks into the folder.
+    /// The setup for a page; reads the folder.
     ///
     /// # Errors
-    /// In words: the folder cannot be read.
+    /// In words: an unreadable folder.
     pub(super) fn shown(&self, role: Role) -> Result<SetupShown, String> {
         let list = |kind| {
             self.folder
@@ -167,8 +164,8 @@ impl NodeSetup {
         })
     }
 
-    /// Takes up what somebody else has put into the scene since it was read or written here, as
-    /// `touchup calibrate` does.
+    /// Takes up edits of the scene file by others since its last reading or writing here, as by
+    /// `touchup calibrate`.
     pub(super) fn take_edits(&self, state: &mut SetupState) -> Result<(), NodeSetupError> {
         let bad = |error: &dyn Display| {
             NodeSetupError::Refused(format!("{}: {error}", self.target.display()))
@@ -196,20 +193,20 @@ impl NodeSetup {
         Ok(())
     }
 
-    /// For what may be done also while a recording is looked at.
+    /// State for actions that are possible during background work.
     pub(super) fn choosing(&self) -> Result<MutexGuard<'_, SetupState>, NodeSetupError> {
         let state = locked(&self.state);
         state.require_choosing().map(|()| state)
     }
 
-    /// For what is done beside, one at a time.
+    /// State for background work, one at a time.
     pub(super) fn idle(&self) -> Result<MutexGuard<'_, SetupState>, NodeSetupError> {
         let state = locked(&self.state);
         state.require_idle().map(|()| state)
     }
 
-    /// For what a check and a calibration depend on, of which nothing is left then but what is in
-    /// the scene.
+    /// State for changes that invalidate a check and a calibration: discards both, except for
+    /// calibrations in the scene.
     pub(super) fn changing(&self) -> Result<MutexGuard<'_, SetupState>, NodeSetupError> {
         let mut state = self.idle()?;
         state.forget_check();

@@ -1,4 +1,4 @@
-//! What a recording of touches says of scan, tip and sensors, as `touchup doctor` prints it.
+//! Check of scan, tip and sensors by a recording of touches, as `touchup doctor` prints it.
 
 use std::path::Path;
 
@@ -12,17 +12,17 @@ use crate::replay::Recording;
 use crate::scan::read_scan;
 use crate::scene::Scene;
 
-/// What was found.
+/// Findings of a check.
 #[derive(Clone, Debug, Serialize)]
 pub(super) struct CheckFacts {
     file: String,
-    /// the surest first; empty: nothing speaks against it
+    /// the surest first; empty: no objection
     findings: Vec<InputFinding>,
-    /// what is missing in the recording
+    /// missing parts of the recording
     losses: Vec<String>,
 }
 
-/// Everything that is checked together.
+/// Inputs of a check.
 pub(super) struct CheckInputs<'a> {
     pub scan: (&'a Path, MeshUnit),
     pub recording: &'a Path,
@@ -35,7 +35,7 @@ pub(super) struct CheckInputs<'a> {
 /// - `file`: name of the recording.
 ///
 /// # Errors
-/// In words: why it cannot be replayed.
+/// In words: the reason of a failed replay.
 pub(super) fn check_recording(file: &str, inputs: &CheckInputs<'_>) -> Result<CheckFacts, String> {
     let CheckInputs {
         scan: (scan, unit),

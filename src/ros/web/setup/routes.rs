@@ -1,4 +1,4 @@
-//! What the page's address answers while a node is being set up.
+//! Routes of the page during the setup of a node.
 
 use std::sync::Arc;
 
@@ -26,17 +26,17 @@ use crate::ros::web::access::Role;
 use crate::ros::web::calls::MAY_ONLY_LOOK;
 use crate::ros::web::entrance::{self, Entrance, as_json, refusal};
 
-/// Bytes of a request that is no file.
+/// Maximum size of a request without a file, bytes.
 const LARGEST_REQUEST: usize = 16 << 10;
 
-/// What is served.
+/// State of the routes.
 #[derive(Clone)]
 struct Served {
     entrance: Arc<Entrance>,
     setup: Arc<NodeSetup>,
 }
 
-/// All that is answered.
+/// All routes.
 pub(in crate::ros::web) fn router(entrance: &Arc<Entrance>, setup: &Arc<NodeSetup>) -> Router {
     let checked = from_fn_with_state(Arc::clone(entrance), entrance::check);
     Router::new()
@@ -62,7 +62,7 @@ pub(in crate::ros::web) fn router(entrance: &Arc<Entrance>, setup: &Arc<NodeSetu
 type Answered = Result<Response, Box<Response>>;
 
 impl Served {
-    /// Refuses who may only look.
+    /// Refuses viewers.
     fn operator(&self, headers: &HeaderMap) -> Result<(), Box<Response>> {
         match self.entrance.role_of(headers)? {
             Role::Operate => Ok(()),
@@ -70,7 +70,7 @@ impl Served {
         }
     }
 
-    /// The setup as it is now.
+    /// The present setup.
     async fn answer(&self, role: Role) -> Answered {
         let setup = Arc::clone(&self.setup);
         let shown = spawn_blocking(move || setup.shown(role))
@@ -82,7 +82,7 @@ impl Served {
             .map_err(|why| Box::new(refusal(StatusCode::SERVICE_UNAVAILABLE, &why)))
     }
 
-    /// Takes a file that an operator sends: its name in the folder.
+    /// Receives a file from an operator: returns its name in the folder.
     async fn take(
         &self,
         name: String,
@@ -98,7 +98,7 @@ impl Served {
         taken.map_err(|(status, why)| Box::new(refusal(status, &why)))
     }
 
-    /// Does what an operator asks for, and answers how it is then.
+    /// Applies an operator's request, and answers with the new setup.
     async fn change<T: DeserializeOwned + Send + 'static>(
         &self,
         headers: &HeaderMap,
@@ -112,7 +112,7 @@ impl Served {
         let asked = serde_json::from_slice(&text)
             .map_err(|error| bad(StatusCode::BAD_REQUEST, error.to_string()))?;
         let setup = Arc::clone(&self.setup);
-        // a file may be looked at or written
+        // may read or write a file
         let done = spawn_blocking(move || change(&setup, asked)).await;
         let done = done.map_err(|error| bad(StatusCode::SERVICE_UNAVAILABLE, error.to_string()))?;
         done.map_err(|error| match &error {
@@ -205,7 +205,7 @@ struct UploadQuery {
     name: String,
 }
 
-/// A scan: the body is the file. It is chosen then.
+/// Receives and chooses a scan: the body is the file.
 async fn take_upload(
     State(served): State<Served>,
     Query(UploadQuery { name }): Query<UploadQuery>,
@@ -224,7 +224,8 @@ async fn take_upload(
     }
 }
 
-/// A recording or a table: the body is the file. Its name is answered, and nothing chosen.
+/// Receives a recording or a table: the body is the file. Answers with its name, and chooses
+/// nothing.
 async fn take_file(
     State(served): State<Served>,
     Query(UploadQuery { name }): Query<UploadQuery>,

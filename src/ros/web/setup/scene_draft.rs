@@ -1,5 +1,4 @@
-//! The scene as it is being made: its text, into which the chosen scan, unit and tip are put;
-//! everything else in it stays as it was.
+//! Draft of the scene: its text with the chosen scan, unit and tip; everything else stays the same.
 
 use std::path::Path;
 use std::time::SystemTime;
@@ -10,26 +9,26 @@ use crate::calibration::{Calibrated, CalibrationKind, calibrated_on, calibrated_
 use crate::io::mesh_file::MeshUnit;
 use crate::scene::{Scene, SceneError, Setting};
 
-/// How the page gives the uncertainty: expanded, k = 2, as everywhere on it.
+/// Coverage factor of uncertainties on the page: expanded, k = 2.
 const COVERAGE_FACTOR: f64 = 2.0;
-/// Goes behind the first key that is set.
+/// Comment on the first changed key.
 const REMARK: &str = "set on the operator's page";
 
 /// The tip as an operator states it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct StatedTip {
-    /// of the ball
+    /// radius of the ball
     pub radius_mm: f64,
-    /// its expanded uncertainty, k = 2; `None`: as the scene has it
+    /// its expanded uncertainty, k = 2; `None`: as in the scene
     #[serde(default)]
     pub uncertainty_mm: Option<f64>,
 }
 
-/// Which calibrations a scene has.
+/// Calibrations in a scene.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub(super) struct NamedCalibrations {
-    /// where the scan lies in the frame of the poses
+    /// pose of the scan in the frame of the poses
     scan: NamedCalibration,
     /// the centre of the ball in the tracked stylus
     tip: NamedCalibration,
@@ -41,8 +40,7 @@ pub(super) struct NamedCalibrations {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub(super) struct NamedCalibration {
     is_there: bool,
-    /// the day on which it was put there, UTC, as 2026-11-27; `None` where the scene does not say
-    /// it
+    /// the day of its entry, UTC, as 2026-11-27; `None`: the scene has no date
     date: Option<String>,
 }
 
@@ -50,12 +48,12 @@ pub(super) struct NamedCalibration {
 #[derive(Clone, Debug)]
 pub(super) struct SceneDraft {
     text: String,
-    /// what the text says
+    /// the parsed text
     pub scene: Scene,
 }
 
 impl SceneDraft {
-    /// - `path`: of the scene to begin with; `None`: the usual one, with every key explained.
+    /// - `path`: of the initial scene; `None`: the default one, with every key explained.
     ///
     /// # Errors
     /// [`SceneError`]
@@ -67,7 +65,7 @@ impl SceneDraft {
         Self::of(text)
     }
 
-    /// The scene that a text is, without the files that it names: they are no part of it.
+    /// Parses a scene, without reading the files that it names.
     ///
     /// # Errors
     /// [`SceneError`]
@@ -78,7 +76,7 @@ impl SceneDraft {
         })
     }
 
-    /// Whether files lie beside the scene that it names, besides the scan.
+    /// Whether the scene names files by relative paths, besides the scan.
     pub fn names_files(&self) -> bool {
         let robot = self.scene.robot.as_ref();
         let files = robot.map(|robot| [&robot.urdf, &robot.check]);
@@ -89,7 +87,7 @@ impl SceneDraft {
             .any(|file| file.is_relative())
     }
 
-    /// Which calibrations are in it (`touchup calibrate`).
+    /// Calibrations in the scene (`touchup calibrate`).
     pub fn calibrations(&self) -> NamedCalibrations {
         let Scene {
             scan_to_space,
@@ -114,7 +112,7 @@ impl SceneDraft {
         }
     }
 
-    /// The same with a calibration in it.
+    /// A copy with a calibration.
     ///
     /// # Errors
     /// [`SceneError`]
@@ -122,12 +120,12 @@ impl SceneDraft {
         Self::of(calibrated_scene(&self.text, found, now)?)
     }
 
-    /// Its text.
+    /// Text of the scene.
     pub fn text(&self) -> &str {
         &self.text
     }
 
-    /// The radius that it says, mm.
+    /// The radius in the scene, mm.
     pub fn radius_mm(&self) -> Option<f64> {
         let is_said = Scene::names(&self.text, "tip", "radius_mm");
         self.scene
@@ -137,18 +135,18 @@ impl SceneDraft {
             .map(|tip| tip.ball.radius * 1e3)
     }
 
-    /// The unit that it says of a scan in its folder; `None` where it names another one.
+    /// The unit of a scan in the scene's folder; `None`: the scene names another scan.
     pub fn unit_of(&self, file: &str) -> Option<MeshUnit> {
         let scan = self.scene.scan.as_ref()?;
         (scan.file.as_deref() == Some(Path::new(file))).then_some(scan.unit)
     }
 
-    /// The text with the tip in it.
+    /// The text with a tip.
     ///
-    /// - `scan`: name of a file in the folder of the scene, and its unit; `None`: as it is.
+    /// - `scan`: name of a file in the folder of the scene, and its unit; `None`: unchanged.
     ///
     /// # Errors
-    /// [`SceneError`]: a number out of its range, or a text in which it cannot be set.
+    /// [`SceneError`]: a number out of its range, or an unsuitable text.
     pub fn with(
         &self,
         tip: Option<StatedTip>,

@@ -1,4 +1,4 @@
-//! The setup as pages are shown it.
+//! The setup as pages show it.
 
 use serde::Serialize;
 
@@ -10,30 +10,30 @@ use crate::calibration::CalibrationKind;
 use crate::io::scan_folder::FolderFile;
 use crate::ros::web::access::Role;
 
-/// A step of the setup, as one that can mend an error.
+/// A step of the setup, also as the remedy of an error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SetupStep {
     /// choose or send a scan
     Scan,
-    /// say in which unit it is
+    /// choose its unit
     Unit,
     /// state the tip
     Tip,
-    /// begin
+    /// start
     Start,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum Stage {
-    /// somebody chooses
+    /// operators choose
     Choosing,
-    /// the node is being made ready
+    /// the node starts
     Starting,
 }
 
-/// The scan as far as it is known.
+/// The scan and its reading.
 #[derive(Clone, Debug, Serialize)]
 #[serde(rename_all = "snake_case", tag = "state")]
 pub(super) enum ScanChoice {
@@ -43,7 +43,7 @@ pub(super) enum ScanChoice {
     Read(ScanFacts),
 }
 
-/// A recording that was looked at.
+/// The check of a recording.
 #[derive(Clone, Debug, Serialize)]
 #[serde(rename_all = "snake_case", tag = "state")]
 pub(super) enum CheckChoice {
@@ -53,7 +53,7 @@ pub(super) enum CheckChoice {
     Found(CheckFacts),
 }
 
-/// A calibration that was made.
+/// A calibration and its progress.
 #[derive(Clone, Debug, Serialize)]
 #[serde(rename_all = "snake_case", tag = "state")]
 pub(super) enum CalibrationChoice {
@@ -71,28 +71,28 @@ pub(super) enum CalibrationChoice {
     Found(Box<CalibrationFacts>),
 }
 
-/// What it found.
+/// Result of a calibration.
 #[derive(Clone, Debug, Serialize)]
 pub(super) struct CalibrationFacts {
     pub what: CalibrationKind,
     pub file: String,
     pub found: FoundCalibration,
-    /// what should be looked at before it is used
+    /// warnings to read before its use
     pub doubts: Vec<String>,
-    /// what is missing in the recording
+    /// missing parts of the recording
     pub losses: Vec<String>,
-    /// whether it is in the scene
+    /// whether the scene contains it
     pub is_used: bool,
 }
 
-/// Why the node did not begin.
+/// Reason of a failed start.
 #[derive(Clone, Debug, Serialize)]
 pub(super) struct SetupFailure {
     pub step: SetupStep,
     pub why: String,
 }
 
-/// How much of an upload has come.
+/// Progress of an upload.
 #[derive(Clone, Debug, Serialize)]
 pub(super) struct UploadShown {
     pub name: String,
@@ -100,7 +100,7 @@ pub(super) struct UploadShown {
     pub of: Option<u64>,
 }
 
-/// What a page is shown.
+/// The setup for a page.
 #[derive(Debug, Serialize)]
 pub(super) struct SetupShown {
     pub stage: Stage,
@@ -108,7 +108,7 @@ pub(super) struct SetupShown {
     pub program: &'static str,
     /// name of the folder of scans
     pub folder: String,
-    /// name of the scene that will be written
+    /// file name of the new scene
     pub scene: String,
     pub files: Vec<FolderFile>,
     pub largest_upload: u64,
@@ -118,11 +118,11 @@ pub(super) struct SetupShown {
     pub tip: Option<StatedTip>,
     /// whether the scene has a tip with a radius
     pub needs_radius: bool,
-    /// that of the scene or of who started the program, to be confirmed
+    /// radius in the scene or on the command line, to be confirmed
     pub known_radius_mm: Option<f64>,
     pub calibrations: NamedCalibrations,
     pub recordings: Vec<FolderFile>,
-    /// of points
+    /// tables of points
     pub tables: Vec<FolderFile>,
     pub calibration: CalibrationChoice,
     pub check: CheckChoice,

@@ -1,4 +1,4 @@
-//! What was chosen so far, and what may be done then.
+//! State of the setup, and the permitted actions.
 
 use super::scene_draft::{SceneDraft, StatedTip};
 use super::setup_shown::{
@@ -6,13 +6,13 @@ use super::setup_shown::{
 };
 use crate::io::mesh_file::MeshUnit;
 
-/// Why something cannot be done now.
+/// Reason of a refused action.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum NodeSetupError {
-    /// it comes too early or too late
+    /// too early or too late
     #[error("{0}")]
     NotNow(&'static str),
-    /// it cannot be so
+    /// an impossible choice
     #[error("{0}")]
     Refused(String),
 }
@@ -36,16 +36,16 @@ const CALIBRATING: NodeSetupError =
 
 pub(super) struct SetupState {
     pub stage: Stage,
-    /// with the calibrations that were made so far
+    /// with the calibrations made until now
     pub draft: SceneDraft,
-    /// text of the scene's file as it was read or written last; empty: there is none
+    /// last text of the scene's file; empty: none
     pub on_disk: String,
     pub scan: ScanChoice,
     pub unit: Option<MeshUnit>,
     pub tip: Option<StatedTip>,
     pub calibration: CalibrationChoice,
     pub check: CheckChoice,
-    /// whether somebody has seen what it found, or does without it
+    /// whether an operator has seen its findings, or goes on without a check
     pub is_check_over: bool,
     pub failure: Option<SetupFailure>,
     pub upload: Option<UploadShown>,
@@ -68,7 +68,7 @@ impl SetupState {
         }
     }
 
-    /// Whether somebody may choose.
+    /// Whether operators may choose.
     pub fn require_choosing(&self) -> Result<(), NodeSetupError> {
         if self.stage == Stage::Choosing {
             Ok(())
@@ -77,7 +77,7 @@ impl SetupState {
         }
     }
 
-    /// Whether somebody may choose, and nothing is done beside.
+    /// Whether operators may choose, without background work.
     pub fn require_idle(&self) -> Result<(), NodeSetupError> {
         self.require_choosing()?;
         match (&self.scan, &self.check, &self.calibration) {
@@ -88,20 +88,20 @@ impl SetupState {
         }
     }
 
-    /// Something changed that a look at a recording depends on: it has to be made anew.
+    /// Discards the check of a recording after a change of its inputs.
     pub fn forget_check(&mut self) {
         (self.check, self.is_check_over) = (CheckChoice::None, false);
     }
 
-    /// What may have kept the node from its start was changed.
+    /// Clears a failed start after a change of its possible cause.
     ///
-    /// - `mended`: where.
+    /// - `mended`: the changed steps.
     pub fn clear_failure(&mut self, mended: &[SetupStep]) {
         self.failure
             .take_if(|failure| mended.contains(&failure.step) || failure.step == SetupStep::Start);
     }
 
-    /// Nobody has to state a tip any more.
+    /// Whether no tip remains to be stated.
     pub fn has_tip(&self) -> bool {
         self.tip.is_some() || self.draft.scene.tip.is_none()
     }

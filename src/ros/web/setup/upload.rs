@@ -1,4 +1,4 @@
-//! A scan, a recording or a table that a page sends: piece by piece into the folder of scans.
+//! Upload of a scan, a recording or a table by a page: piece by piece into the folder of scans.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -15,23 +15,23 @@ use super::setup_state::{NodeSetupError, READING};
 use crate::io::scan_folder::{ScanFolderError, ScanUpload};
 use crate::ros::locked;
 
-/// Bytes that are written at a time.
+/// Bytes per write.
 const PIECE: usize = 1 << 20;
-/// Bytes of a refused file that are let pass.
+/// Maximum number of bytes skipped of a refused file.
 const LARGEST_UNHEARD: usize = 64 << 20;
-/// An upload of which nothing comes for so long has ended.
+/// Time-out for the next piece of an upload.
 const STALLED: Duration = Duration::from_secs(30);
 
-/// Why a file was not taken.
+/// Reason of a refused file.
 pub(super) type UploadRefusal = (StatusCode, String);
 
-/// Takes a file: the name that it has in the folder.
+/// Receives a file: returns its name in the folder.
 ///
 /// - `is_scan`: a scan, or else a recording or a table of points.
-/// - `length`: bytes that are to come, as far as it was said.
+/// - `length`: announced number of bytes, if any.
 ///
 /// # Errors
-/// The status and why, in words; nothing is left of the file then.
+/// The status and the reason, in words; nothing of the file remains.
 pub(super) async fn take(
     setup: &Arc<NodeSetup>,
     name: String,
@@ -46,7 +46,7 @@ pub(super) async fn take(
     let (place, mut upload) = match begin(setup, name, is_scan, length).await {
         Ok(begun) => begun,
         Err(refused) => {
-            // a browser that still sends hears no answer
+            // a browser that still sends reads no answer
             let mut left = LARGEST_UNHEARD;
             while let Ok(Some(Ok(piece))) = timeout(STALLED, pieces.next()).await {
                 let Some(less) = left.checked_sub(piece.len()) else {
@@ -84,8 +84,7 @@ pub(super) async fn take(
 }
 
 impl NodeSetup {
-    /// Takes the place of the one upload at a time; it is free again when what comes back is
-    /// dropped.
+    /// Takes the place of the only upload; dropping the result frees it.
     ///
     /// # Errors
     /// [`NodeSetupError::NotNow`]
@@ -117,7 +116,7 @@ impl NodeSetup {
 struct UploadPlace(Arc<NodeSetup>);
 
 impl UploadPlace {
-    /// So much has come.
+    /// Sets the number of received bytes.
     fn note(&self, so_far: u64) {
         if let Some(upload) = &mut locked(&self.0.state).upload {
             upload.bytes = so_far;
@@ -156,7 +155,7 @@ async fn write(
     .await
 }
 
-/// On a thread that may wait for the disk.
+/// Runs on a thread that may wait for the disk.
 async fn on_disk<T: Send + 'static>(
     work: impl FnOnce() -> Result<T, ScanFolderError> + Send + 'static,
 ) -> Result<T, UploadRefusal> {
