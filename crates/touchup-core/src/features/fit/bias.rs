@@ -1,19 +1,19 @@
-//! What curvature does to the mean of a fit, and its removal.
+//! Bias of a fit by curvature, and its removal.
 //!
 //! Expand the residual of one point to second order in its error ε (isotropic, variance σ²) and in
 //! the error δ of the fitted freedoms: f = n·ε + J·δ + ½ εᵀHε + εᵀMδ + ½ δᵀGδ. To first order δ is
-//! linear in the n·ε alone, with covariance C. Taking the mean of the normal equations Σ w (∂f/∂δ)
-//! f = 0 to second order: nᵀM = 0, since the derivative of a distance is constant along the normal,
+//! linear in the n·ε alone, with covariance C. Take the mean of the normal equations Σ w (∂f/∂δ) f
+//! = 0 to second order: nᵀM = 0, since the derivative of a distance is constant along the normal,
 //! and tangential errors do not reach δ, so all terms with M vanish; the terms with Gδ times the
 //! residual cancel, since residuals and estimates of least squares are uncorrelated. There remains
 //!
-//! E δ = −(Σ w JᵀJ)⁻¹ Σ w Jᵀ b,   b = ½ (σ² tr H + tr G C):
+//! E δ = −(Σ w JᵀJ)⁻¹ Σ w Jᵀ b, b = ½ (σ² tr H + tr G C):
 //!
-//! the same as if every distance were too large by b. So b is taken off. For a circle of radius r,
-//! σ² tr H / 2 is σ²/(2r): the essential bias of the geometric fit \[Al-Sharadqah and Chernov
-//! 2009\], which does not fall with the number of points; the second term falls with it and matters
-//! on short arcs. Both are taken as second differences over one standard deviation, so no second
-//! derivatives are needed.
+//! the same as if every distance were too large by b. The fit therefore subtracts b. For a circle
+//! of radius r, σ² tr H / 2 is σ²/(2r): the essential bias of the geometric fit \[Al-Sharadqah and
+//! Chernov 2009\], which does not fall with the number of points; the second term falls with it and
+//! matters on short arcs. Second differences over one standard deviation give both without second
+//! derivatives.
 
 use nalgebra::Vector3;
 
@@ -22,11 +22,11 @@ use super::uncertainty::SPARE_GROUPS;
 use super::{Fit, Surface};
 
 impl<M: Surface> Fit<M> {
-    /// b of each observation, m, for errors as large as the residuals say.
+    /// b of each observation, m, for the error level of the residuals.
     pub(super) fn bias(&self, problem: &FitProblem) -> Vec<f64> {
         let surface = &self.surface;
         let fixed = self.groups.saturating_sub(self.degrees);
-        // over the stated errors; as large where there are too few to say
+        // ratio to the stated errors; 1 with too few groups for an estimate
         let excess = if self.degrees > fixed + SPARE_GROUPS {
             self.chi_squared / self.degrees as f64
         } else {

@@ -11,15 +11,14 @@ use crate::numeric::mean;
 /// A cone, by one of its circles and the angle between its lines and its axis.
 ///
 /// Its freedoms are a shift along its normal and the angle, turned about the circle: both stay well
-/// conditioned from a cylinder (angle 0) to a flat cone (angle near 90°), where apex and radius are
-/// not.
+/// conditioned from a cylinder (angle 0) to a flat cone (angle near 90°), unlike apex and radius.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cone {
     /// Frame F in O: the origin is the centre of the circle, z the axis.
     pub pose_of: Isometry3<f64>,
     /// Radius of the circle, m.
     pub radius: f64,
-    /// Angle between the lines and the axis, rad, within ± π/2; positive where it widens along z.
+    /// Angle between the lines and the axis, rad, within ± π/2; positive if it widens along z.
     pub half_angle: f64,
     /// Whether the air is inside (a countersink) and not the material.
     pub concave: bool,
@@ -42,7 +41,7 @@ impl Cone {
         }
     }
 
-    /// Where all lines meet, m, in O; `None` for a cylinder.
+    /// Apex, m, in O; `None` for a cylinder.
     pub fn apex(&self) -> Option<Point3<f64>> {
         let height = -self.radius / self.half_angle.tan();
         height

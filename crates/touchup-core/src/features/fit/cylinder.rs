@@ -6,7 +6,7 @@ use super::surface::{AXIS, CENTRE, RADIUS, check_size, pose_along, radial, side}
 use super::{Distance, FREEDOMS, Fit, FitError, Surface};
 use crate::numeric::mean;
 
-/// A direction is along the axis when the square of its sine is no more than rounding leaves.
+/// Bound on the squared sine between a direction and the axis for parallelism: rounding level.
 const ALONG: f64 = 1e-24;
 
 /// A cylinder without ends.
@@ -76,15 +76,15 @@ impl Surface for Cylinder {
 }
 
 impl Cylinder {
-    /// The place of its axis that is nearest to a point in O, m.
+    /// Nearest point on the axis to a point in O, m.
     pub(crate) fn nearest_on_axis(&self, point: &Point3<f64>) -> Point3<f64> {
         self.center() + self.axis() * (point - self.center()).dot(&self.axis())
     }
 }
 
 impl Cylinder {
-    /// How far along the unit vector `direction` from `from` (in O) the cylinder is left, m; `None`
-    /// where it is not met, or along its axis.
+    /// Distance from `from` (in O) along the unit vector `direction` to the exit from the cylinder,
+    /// m; `None`: no hit, or a direction along the axis.
     pub(crate) fn exit(&self, from: &Point3<f64>, direction: &Vector3<f64>) -> Option<f64> {
         let axis = self.axis();
         let across = |v: Vector3<f64>| v - axis * v.dot(&axis);
@@ -101,7 +101,7 @@ impl Cylinder {
 }
 
 impl Fit<Cylinder> {
-    /// Root mean square distance across the axis by which a place on it may be off, m.
+    /// Root mean square lateral uncertainty of a place on the axis, m.
     pub(crate) fn lateral_std(&self, at: &Point3<f64>) -> Option<f64> {
         let height = self.surface.pose_of.inverse_transform_point(at).z;
         self.center_covariance(height)

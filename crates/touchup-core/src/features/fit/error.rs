@@ -1,18 +1,18 @@
-//! Why a fit is refused.
+//! Errors of a fit.
 
-/// What makes a fit impossible.
+/// Reason of a failed fit.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FitError {
-    /// Fewer observations than unknowns, at the start or after outliers were rejected.
+    /// Fewer observations than unknowns, at the start or after the rejection of outliers.
     #[error(
         "{have} observations (of {given} given) cannot fix {need} unknowns; touch in more places"
     )]
     TooFewObservations {
-        /// how many are kept
+        /// number of kept observations
         have: usize,
-        /// how many were given
+        /// number of given observations
         given: usize,
-        /// how many are needed
+        /// number of needed observations
         need: usize,
     },
     /// All observations share their error.
@@ -21,23 +21,23 @@ pub enum FitError {
     /// NaN or infinite.
     #[error("observation {index} is not finite; drop it")]
     NotFinite {
-        /// which one
+        /// number of the observation
         index: usize,
     },
     /// A standard deviation that is not positive and finite.
     #[error("{what} is {sigma} (SI units); it must be finite and above 0")]
     BadSigma {
-        /// whose
+        /// quantity
         what: &'static str,
-        /// what it is
+        /// its standard deviation
         sigma: f64,
     },
-    /// The observations do not fix a number without which the surface is none.
+    /// A needed freedom is not determined by the observations.
     #[error(
         "the observations do not fix the {what}; touch where it makes a difference, or give a known axis"
     )]
     Undetermined {
-        /// which number
+        /// the freedom
         what: &'static str,
     },
     /// The iteration did not converge.
@@ -45,15 +45,15 @@ pub enum FitError {
         "the fit did not converge in {iterations} iterations; is the first guess near the surface?"
     )]
     NotConverged {
-        /// how many were made
+        /// number of iterations
         iterations: usize,
     },
-    /// A size that no surface has.
+    /// A size outside the range of the surface.
     #[error(
         "the {what} came out as {value} (SI units); is the surface hollow where it should be solid?"
     )]
     BadSize {
-        /// which size
+        /// the size
         what: &'static str,
         /// its value, m or rad
         value: f64,

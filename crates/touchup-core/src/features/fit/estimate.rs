@@ -1,12 +1,12 @@
-//! The result of a fit: a surface, and how well each of its numbers is known.
+//! The result of a fit: a surface, and the uncertainty of each of its freedoms.
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
 use super::solver::FreedomMatrix;
 use super::{Freedom, Observation, Steps, Surface};
 
-/// A direction is free of what is unknown when less than this share of it lies there; roundings of
-/// the eigenvectors stay far below.
+/// Maximum share of a direction in undetermined ones if it is determined; roundings of the
+/// eigenvectors stay far below.
 const KNOWN: f64 = 1e-6;
 
 /// A fitted surface.
@@ -14,33 +14,32 @@ const KNOWN: f64 = 1e-6;
 pub struct Fit<M> {
     /// The surface of least squares, without the bias of curvature.
     pub surface: M,
-    /// Covariance of its freedoms in their order, m and rad; without those that are undetermined.
-    /// By the residuals in the directions in which they are larger than the stated deviations
-    /// explain; where there are too few groups to ask them, by the stated ones, stretched by
-    /// √(χ²/degrees) where that is above 1.
+    /// Covariance of the freedoms in their order, m and rad; without undetermined ones. From the
+    /// residuals in directions in which they exceed the stated deviations; with too few groups from
+    /// the stated ones, stretched by √(χ²/degrees) if above 1.
     pub covariance: FreedomMatrix,
-    /// … of it without what all observations have in common: two surfaces touched alike differ by
-    /// this alone.
+    /// Covariance without the common errors of all observations: the difference of two surfaces
+    /// with the same touches has this part alone.
     pub own_covariance: FreedomMatrix,
     /// For each observation whether it was kept.
     pub used: Vec<bool>,
-    /// Σ w r² of what was kept, where groups count once.
+    /// Σ w r² of the kept observations; a group counts once.
     pub chi_squared: f64,
-    /// Groups less unknowns: what χ² should be about.
+    /// Groups less unknowns: the expectation of χ².
     pub degrees: usize,
-    /// Groups of which something was kept.
+    /// Number of groups with kept observations.
     pub groups: usize,
-    /// projector onto what is not fixed, in units of `alone`
+    /// projector onto undetermined directions, in units of `alone`
     pub(super) unknown: FreedomMatrix,
-    /// the step of each freedom that changes the residuals by one standard deviation if taken alone
+    /// step of each freedom that alone changes the residuals by one standard deviation
     pub(super) alone: Steps,
-    /// columns: one standard deviation in each fixed direction, as steps; zero columns for what is
-    /// not fixed
+    /// columns: one standard deviation in each fixed direction, as steps; zero columns for
+    /// undetermined directions
     pub(super) deviations: FreedomMatrix,
 }
 
 impl<M: Surface> Fit<M> {
-    /// Root mean square distance of what was kept of the observations, m.
+    /// Root mean square residual of the kept observations, m.
     pub(crate) fn unevenness(&self, observations: &[Observation]) -> f64 {
         let used = observations
             .iter()
@@ -53,30 +52,29 @@ impl<M: Surface> Fit<M> {
         f64::sqrt(squares / f64::max(count, 1.0))
     }
 
-    /// Standard deviation of one freedom, m or rad; `None` where the observations do not fix it.
+    /// Standard deviation of one freedom, m or rad; `None` if undetermined.
     pub fn std(&self, freedom: Freedom) -> Option<f64> {
         self.std_of(&Steps::ith(freedom as usize, 1.0))
     }
 
-    /// Standard deviation of a number that changes with the freedoms as `by` says; `None` where it
-    /// is not fixed.
+    /// Standard deviation of a number with the derivatives `by`; `None` if undetermined.
     pub(crate) fn std_of(&self, by: &Steps) -> Option<f64> {
         self.std_in(&self.covariance, by)
     }
 
-    /// As [`Self::std_of`], without what all observations have in common.
+    /// As [`Self::std_of`], without the common errors of all observations.
     pub(crate) fn own_std_of(&self, by: &Steps) -> Option<f64> {
         self.std_in(&self.own_covariance, by)
     }
 
-    /// Standard deviation of the surface along its normal at a point of it given in O, m; `None`
-    /// where it is not fixed.
+    /// Standard deviation of the surface along its normal at a point on it, m, in O; `None` if
+    /// undetermined.
     pub fn std_at(&self, point: &Point3<f64>) -> Option<f64> {
         let (_, by) = self.surface.derivatives(point);
         self.std_of(&by)
     }
 
-    /// As [`Self::std_at`], without what all observations have in common.
+    /// As [`Self::std_at`], without the common errors of all observations.
     pub(crate) fn own_std_at(&self, point: &Point3<f64>) -> Option<f64> {
         let (_, by) = self.surface.derivatives(point);
         self.own_std_of(&by)
@@ -89,8 +87,8 @@ impl<M: Surface> Fit<M> {
         (has_all && is_fixed).then(|| by.dot(&(covariance * by)).max(0.0).sqrt())
     }
 
-    /// Standard deviation of a number, from its derivatives by some freedoms; `None` where it is
-    /// not fixed.
+    /// Standard deviation of a number, from its derivatives by some freedoms; `None` if
+    /// undetermined.
     pub fn std_by(&self, by: &[(Freedom, f64)]) -> Option<f64> {
         let mut steps = Steps::zeros();
         by.iter()
@@ -98,13 +96,13 @@ impl<M: Surface> Fit<M> {
         self.std_of(&steps)
     }
 
-    /// Angle by which the axis may be off, rad: root of the sum of both variances.
+    /// Angular uncertainty of the axis, rad: root of the sum of both variances.
     pub fn axis_std(&self) -> Option<f64> {
         Some(self.std(Freedom::TiltX)?.hypot(self.std(Freedom::TiltY)?))
     }
 
-    /// Covariance in O of the place where the axis is `height` above the origin of F, m²; none
-    /// along the axis. `None` where it is not fixed.
+    /// Covariance in O of the point on the axis at `height` above the origin of F, m²; 0 along the
+    /// axis. `None` if undetermined.
     pub fn center_covariance(&self, height: f64) -> Option<Matrix3<f64>> {
         let lever = |shift: Freedom, tilt: Freedom| {
             let mut by = Steps::ith(shift as usize, 1.0);

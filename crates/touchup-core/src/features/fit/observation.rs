@@ -1,18 +1,18 @@
-//! What is fitted to, and how.
+//! Observations and parameters of a fit.
 
 use nalgebra::Point3;
 
 use super::FitError;
 
-/// One measured point and how far it should be from the surface.
+/// One measured point and its nominal distance from the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Observation {
-    /// The point in O, m: the centre of the ball that touches, or a vertex of the mesh.
+    /// The point in O, m: the centre of the touching ball, or a vertex of the mesh.
     pub point: Point3<f64>,
-    /// Signed distance it should have from the surface, m, positive in the air: the ball's radius,
-    /// or 0 for a vertex.
+    /// Nominal signed distance from the surface, m, positive in the air: the ball's radius, or 0
+    /// for a vertex.
     pub offset: f64,
-    /// Standard deviation along the normal, m, > 0; across the normal it is taken to be the same.
+    /// Standard deviation along the normal, m, > 0; assumed the same across it.
     pub sigma: f64,
     /// Observations of one group share their error, those of different groups do not: one pass of
     /// the stylus over about 0.1 s.
@@ -22,19 +22,18 @@ pub struct Observation {
 /// Input of a fit beside its observations.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FitParams {
-    /// Standard deviation of an error that all observations have in common along their normals, m:
-    /// the calibration of the ball's radius. It goes into radii and widths in full, into a diameter
-    /// twice, and not into an axis.
+    /// Standard deviation of a common error of all observations along their normals, m: the
+    /// calibration of the ball's radius. It enters radii and widths in full, a diameter twice, and
+    /// an axis not at all.
     pub common_sigma: f64,
-    /// Standard deviation of a displacement that all observations have in common, along each axis,
-    /// m: the place of the scan. It goes into the place of what is fitted in full, into no size and
-    /// no direction.
+    /// Standard deviation of a common displacement of all observations, along each axis, m: the
+    /// position of the scan. It enters the position of the surface in full, but no size and no
+    /// direction.
     pub shift_sigma: f64,
-    /// How well the axis of the first guess is known before, rad in each of two directions; `None`:
-    /// not at all. A hole in thin metal has its axis from the plane around it.
+    /// Prior standard deviation of the axis of the first guess, rad in each of two directions;
+    /// `None`: no prior. A hole in thin metal has its axis from the plane around it.
     pub axis_sigma: Option<f64>,
-    /// What lies farther from the surface than this many standard deviations is an outlier. 4: one
-    /// in 16000 good ones.
+    /// Limit of outliers in standard deviations of the residual. 4 rejects one in 16000 good ones.
     pub rejection: f64,
 }
 

@@ -28,12 +28,12 @@ impl Plane {
         self.axis()
     }
 
-    /// A point on it, m, in O.
+    /// A point on the plane, m, in O.
     pub fn point(&self) -> Point3<f64> {
         self.pose_of.translation.vector.into()
     }
 
-    /// How far from `from` along `direction` it is met, m; `None` where they are parallel.
+    /// Distance from `from` along `direction` to the plane, m; `None`: parallel.
     pub(crate) fn along(&self, from: &Point3<f64>, direction: &Vector3<f64>) -> Option<f64> {
         let normal = self.normal();
         let t = (self.point() - from).dot(&normal) / direction.dot(&normal);

@@ -1,31 +1,30 @@
-//! The fit itself: three rounds of robust regression that reject what does not belong to the
-//! surface.
+//! Robust fit: three rounds of regression that reject observations off the surface.
 
 use super::solver::FitProblem;
 use super::{Fit, FitError, FitParams, Observation, Surface};
 use crate::numeric::{SIGMA_OF_MEDIAN, TUKEY_WIDTH, biweight, median};
 
-/// Weight updates in one round; the weights converge long before.
+/// Maximum number of weight updates in one round; the weights converge long before.
 const MOST_UPDATES: usize = 50;
-/// Weights that change by less than this have converged; the rounds after them need no more.
+/// Weight change at convergence; the later rounds need no more.
 const SETTLED_WEIGHT: f64 = 1e-2;
-/// Rounds of rejection; what is kept repeats after two or three.
+/// Maximum number of rejections; the kept set repeats after two or three.
 const MOST_REJECTIONS: usize = 10;
 /// Efficiency of 95 % on normal errors, as [`TUKEY_WIDTH`].
 const HUBER: f64 = 1.345;
-/// Corrections of the bias by curvature; the second one changes it in the fourth order.
+/// Number of corrections of the curvature bias; the second one is of fourth order.
 const DEBIASINGS: usize = 2;
 
 /// Fits a surface to observations, from a first guess.
 ///
-/// Huber's weights bring the guess near without being held by outliers, Tukey's biweights drop
-/// them; then what lies beyond `rejection` scaled standard deviations is taken out and the
-/// remainder is fitted by plain least squares, corrected for the bias that curvature brings. The
-/// scale is the median of the normalised residuals, and never below 1: groups share errors, so
-/// residuals may look smaller than the errors are.
+/// Huber's weights bring the guess near despite outliers, Tukey's biweights drop them; then the fit
+/// rejects observations beyond `rejection` scaled standard deviations and takes plain least squares
+/// of the rest, corrected for the bias by curvature. The scale is the median of the normalised
+/// residuals, and never below 1: groups share errors, so residuals may look smaller than the errors
+/// are.
 ///
 /// # Errors
-/// [`FitError`]; on NaN, too few observations, and where a needed number is not fixed by them.
+/// [`FitError`]; on NaN, too few observations, and an undetermined needed freedom.
 pub fn fit<M: Surface>(
     guess: &M,
     observations: &[Observation],
@@ -54,11 +53,12 @@ pub fn fit<M: Surface>(
     fit.checked()
 }
 
-/// As [`fit`], to a mesh alone: neighbours are off alike, so its surface may be off as a whole by
-/// as much as the mesh is uneven, which no residual shows.
+/// As [`fit`], to a mesh alone: neighbours have like errors, so the surface may be off as a whole
+/// by the unevenness of the mesh, which no residual shows.
 ///
-/// - `uneven`: how uneven it is around, m; what is more so itself counts as it is.
-/// - `facets`: how far flat faces are off the surface, m.
+/// - `uneven`: unevenness of the surroundings, m; a larger unevenness of the surface itself
+///   replaces it.
+/// - `facets`: distance of flat faces from the surface, m.
 ///
 /// # Errors
 /// As [`fit`].
@@ -79,7 +79,7 @@ pub(crate) fn fit_mesh<M: Surface>(
     fit(&found.surface, observations, &params)
 }
 
-/// Refuses fewer observations than unknowns, and those of one group alone.
+/// Refuses fewer observations than unknowns, and observations of one group alone.
 fn enough<M: Surface>(problem: &FitProblem, kept: &[f64]) -> Result<(), FitError> {
     let have = kept.iter().filter(|k| **k > 0.0).count();
     let known = if problem.known_axis.is_some() { 2 } else { 0 };
@@ -117,7 +117,7 @@ fn scale<M: Surface>(z: &[f64]) -> f64 {
     (SIGMA_OF_MEDIAN * median(&mut sizes).unwrap_or(0.0) * freedom.sqrt()).max(1.0)
 }
 
-/// Steps and weights by turns until both converge. A round that does not is no error: the next one
+/// Alternates steps and weights until both converge. No convergence is no error: the next round
 /// goes on from there.
 fn reweighted<M: Surface>(problem: &FitProblem, mut surface: M, weight: fn(f64) -> f64) -> M {
     let mut before = vec![0.0; problem.observations.len()];
@@ -139,7 +139,7 @@ fn reweighted<M: Surface>(problem: &FitProblem, mut surface: M, weight: fn(f64) 
     surface
 }
 
-/// Least squares without what lies too far, until the same are kept twice; and which those are (1,
+/// Least squares with rejection of outliers, until the kept set repeats; also returns that set (1,
 /// others 0).
 fn rejected<M: Surface>(
     problem: &FitProblem,

@@ -8,9 +8,9 @@ use crate::numeric::{DampedSearch, NormalEquations, SearchEnd, centroid_and_spre
 /// A matrix over the freedoms.
 pub(super) type FreedomMatrix = SMatrix<f64, FREEDOMS, FREEDOMS>;
 
-/// Steps of one solution that help; a sound problem needs fewer than ten.
+/// Maximum number of successful steps of one solution; a sound problem needs fewer than ten.
 const MOST_STEPS: usize = 100;
-/// At worst one that does not comes before each.
+/// At worst one failed step precedes each.
 const SEARCH: DampedSearch = DampedSearch {
     first: 1e-4,
     factors: [0.1, 10.0],
@@ -18,15 +18,15 @@ const SEARCH: DampedSearch = DampedSearch {
     most: 1e10,
     tries: 2 * MOST_STEPS,
 };
-/// A step below this many standard deviations is the last.
+/// The search ends at a step below this number of standard deviations.
 const SETTLED: f64 = 1e-6;
-/// Longest step, in sizes of what was touched and in rad: a longer one may leap into the valley in
+/// Maximum step, in sizes of the touched area and in rad: a longer one may leap into the valley in
 /// which a circle fitted to a short arc grows without end.
 const LONGEST_STEP: f64 = 0.3;
-/// Keeps the matrix definite in directions that nothing fixes; as a share of its largest entry.
+/// Keeps the matrix definite in undetermined directions; as a share of its largest entry.
 const RIDGE: f64 = 1e-13;
 
-/// Observations with their groups, and the unit in which lengths are counted while solving.
+/// Observations with their groups, and the unit of lengths while solving.
 pub(super) struct FitProblem<'a> {
     pub observations: &'a [Observation],
     /// group of each observation, counted from 0
@@ -35,9 +35,9 @@ pub(super) struct FitProblem<'a> {
     /// root mean square distance of the points from their centre, m: makes all unknowns of order
     /// one
     pub size: f64,
-    /// axis known before, in O, and its standard deviation, rad
+    /// prior axis, in O, and its standard deviation, rad
     pub known_axis: Option<(Vector3<f64>, f64)>,
-    /// what is taken off the distance of each point, m
+    /// correction subtracted from the distance of each point, m
     pub shift: Vec<f64>,
 }
 
@@ -59,7 +59,7 @@ impl<'a> FitProblem<'a> {
         }
     }
 
-    /// What a scaled step of 1 is in each freedom: `size` for lengths, 1 rad for angles.
+    /// Size of a scaled step of 1 in each freedom: `size` for lengths, 1 rad for angles.
     pub fn units<M: Surface>(&self) -> Steps {
         let second = if M::SECOND_IS_LENGTH { self.size } else { 1.0 };
         Steps::from([
@@ -79,8 +79,8 @@ impl<'a> FitProblem<'a> {
             .collect()
     }
 
-    /// Weights of the squares, 1/m²: what is `kept` (0 to 1) of each, over σ² and over how many are
-    /// kept of its group.
+    /// Weights of the squares, 1/m²: the `kept` share (0 to 1) of each observation, over σ² and
+    /// over the sum of the shares in its group.
     pub fn weights(&self, kept: &[f64]) -> Vec<f64> {
         let mut in_group = vec![0.0; self.groups];
         self.group
@@ -93,8 +93,7 @@ impl<'a> FitProblem<'a> {
         (0..kept.len()).map(weight).collect()
     }
 
-    /// Of the residuals around a surface, which a scaled step is to take off: the step is minus
-    /// their solution.
+    /// Normal equations of the residuals around a surface: a scaled step is minus their solution.
     pub fn equations<M: Surface>(&self, surface: &M, weights: &[f64]) -> NormalEquations<FREEDOMS> {
         let units = self.units::<M>();
         let mut sum = self.prior(surface);
@@ -107,7 +106,7 @@ impl<'a> FitProblem<'a> {
         sum
     }
 
-    /// What the axis known before adds: seen from F it leans by −a, a its own x and y.
+    /// Equations of the prior axis: seen from F it leans by −a, a its own x and y.
     ///
     /// Turning F by ω takes a from a to a + a × ω, ω as in [`Surface::derivatives`].
     pub fn prior<M: Surface>(&self, surface: &M) -> NormalEquations<FREEDOMS> {
@@ -136,7 +135,8 @@ impl<'a> FitProblem<'a> {
         self.prior(surface).square + weights.iter().enumerate().map(of_points).sum::<f64>()
     }
 
-    /// Steps that do not raise the cost, until one is shorter than `last` standard deviations.
+    /// Takes steps that do not raise the cost, until one is shorter than `last` standard
+    /// deviations.
     fn search<M: Surface>(
         &self,
         search: &DampedSearch,
@@ -172,7 +172,7 @@ impl<'a> FitProblem<'a> {
         (surface, end)
     }
 
-    /// One step that does not raise the cost, where there is one.
+    /// Takes one step that does not raise the cost, if any.
     pub fn step<M: Surface>(&self, surface: M, weights: &[f64]) -> M {
         self.search(
             &DampedSearch {
@@ -199,7 +199,7 @@ impl<'a> FitProblem<'a> {
         }
     }
 
-    /// The same surface described from amid what is kept, of which there is at least one.
+    /// The same surface with its frame amid the kept observations, at least one.
     pub fn described<M: Surface>(&self, surface: &M, kept: &[f64]) -> M {
         let is_kept = self
             .observations

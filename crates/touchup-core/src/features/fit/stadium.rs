@@ -6,14 +6,13 @@ use super::surface::{AXIS, check_size, pose_along, side};
 use super::{Distance, FREEDOMS, Fit, FitError, Freedom, Surface};
 use crate::numeric::mean;
 
-/// A touch determines an end when its normal has at least this share along the slot: 30° from the
-/// wall.
+/// Minimum share of the normal along the slot for a touch to determine an end: 30° from the wall.
 const LEAST_ALONG: f64 = 0.5;
-/// An end is touched when so many touches determine it; one may be an outlier.
+/// Minimum number of touches that determine an end; one may be an outlier.
 const LEAST_TOUCHES: usize = 2;
 
 /// Distance of (x, y) from the segment from (−half, 0) to (half, 0), m, and the unit vector away
-/// from it; y on the segment itself, where both sides will do.
+/// from it; y on the segment itself, as both sides will do.
 pub(crate) fn from_segment(x: f64, y: f64, half: f64) -> (f64, [f64; 2]) {
     let beyond = (x.abs() - half).max(0.0).copysign(x);
     let rho = beyond.hypot(y);
@@ -27,7 +26,7 @@ pub(crate) fn from_segment(x: f64, y: f64, half: f64) -> (f64, [f64; 2]) {
     )
 }
 
-/// What closes a slot.
+/// Shape of the ends of a slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ends {
     /// Half circles as wide as the slot.
@@ -44,11 +43,10 @@ pub struct Stadium {
     pub pose_of: Isometry3<f64>,
     /// From wall to wall, m.
     pub width: f64,
-    /// From end to end, over all, m; not less than the width where the ends are round. After a fit
-    /// that leaves it undetermined it only says how far no end is, and [`super::Fit::std`] has no
-    /// figure of it.
+    /// From end to end, over all, m; not less than the width with round ends. If a fit leaves it
+    /// undetermined, no end lies within it, and [`super::Fit::std`] has no figure of it.
     pub length: f64,
-    /// What closes it.
+    /// Shape of the ends.
     pub ends: Ends,
     /// Whether the air is inside (a slot) and not the material.
     pub concave: bool,
@@ -77,14 +75,14 @@ impl Stadium {
         }
     }
 
-    /// Unit vector along it, in O.
+    /// Unit vector along the slot, in O.
     pub fn direction(&self) -> Vector3<f64> {
         self.pose_of.rotation * Vector3::x()
     }
 
-    /// Where the end in direction `sign` is along x; an end that was not touched is put where no
-    /// point constrains it, for otherwise the last touches of the walls, with their noise, would
-    /// decide how near it is.
+    /// Position along x of the end in direction `sign`; an untouched end goes beyond the constraint
+    /// of all points, for otherwise the last touches of the walls, with their noise, would decide
+    /// its position.
     fn end_beyond(&self, points: &[Vector3<f64>], sign: f64) -> f64 {
         let faces_end = |q: &&Vector3<f64>| {
             q.x * sign > 0.0 && self.distance_at(q).normal.x.abs() > LEAST_ALONG
@@ -109,7 +107,7 @@ impl Stadium {
         (rho - self.width / 2.0, normal, [along - 0.5, -along])
     }
 
-    /// The same for the rectangle: outside its corners are rounded off by the distance.
+    /// As for round ends, for the rectangle: outside, the distance rounds off its corners.
     fn straight_outline(&self, q: &Vector3<f64>) -> (f64, [f64; 2], [f64; 2]) {
         let (dx, dy) = (q.x.abs() - self.length / 2.0, q.y.abs() - self.width / 2.0);
         let (value, [x, y]) = match (dx > 0.0 && dy > 0.0, dx > dy) {
@@ -186,8 +184,8 @@ impl Surface for Stadium {
 }
 
 impl Fit<Stadium> {
-    /// By how much the middle may be off across it and along it, m; `None` where its ends do not
-    /// determine where it is along.
+    /// Uncertainty of the middle, across and along the slot, m; `None`: the ends do not determine
+    /// its position along.
     pub(crate) fn middle_std(&self) -> Option<f64> {
         Some(self.std(Freedom::Y)?.hypot(self.std(Freedom::X)?))
     }

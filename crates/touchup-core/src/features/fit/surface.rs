@@ -1,17 +1,17 @@
-//! What every surface that can be fitted has in common: a pose and up to two sizes that can change.
+//! Interface of all fitted surfaces: a pose and up to two sizes.
 
 use nalgebra::{Isometry3, Point3, SVector, Translation3, UnitQuaternion, Vector3};
 
 use super::FitError;
 
-/// How many [`Freedom`]s there are.
+/// Number of [`Freedom`]s.
 pub const FREEDOMS: usize = 8;
 
 /// A small change of each freedom, m or rad, indexed by [`Freedom`].
 pub type Steps = SVector<f64, FREEDOMS>;
 
-/// One degree of freedom of a surface. Directions are those of its own frame F, whose z is its axis
-/// or normal.
+/// One degree of freedom of a surface. Directions are in its own frame F, whose z is its axis or
+/// normal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Freedom {
     /// Shift along x of F, m.
@@ -46,7 +46,7 @@ impl Freedom {
     ];
 }
 
-/// Where a point lies with respect to a surface.
+/// Position of a point relative to a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Distance {
     /// Signed distance, m, positive in the air.
@@ -59,12 +59,11 @@ pub struct Distance {
 
 /// A surface that [`super::fit`] can fit.
 pub trait Surface: Clone {
-    /// What each of its freedoms is called in errors; `None`: it has not that one.
+    /// Names of its freedoms in errors; `None`: it lacks the freedom.
     const NAMES: [Option<&'static str>; FREEDOMS];
-    /// The freedoms it has.
+    /// Its freedoms.
     const FREE: [bool; FREEDOMS] = are_named(Self::NAMES);
-    /// The freedoms without which a fit of it is worth nothing; the others may come out
-    /// undetermined.
+    /// Freedoms without which a fit is worthless; the others may come out undetermined.
     const NEEDED: [bool; FREEDOMS] = Self::FREE;
     /// Whether its second size is a length.
     const SECOND_IS_LENGTH: bool = false;
@@ -75,32 +74,31 @@ pub trait Surface: Clone {
     /// Distance of a point given in F.
     fn distance_at(&self, q: &Vector3<f64>) -> Distance;
 
-    /// The same shape with another pose, and its sizes changed by so much.
+    /// The same shape with another pose, and its sizes changed by `by`.
     fn with(&self, pose_of: Isometry3<f64>, by: [f64; 2]) -> Self;
 
-    /// The same surface, described from its place amid points given in F, of which there is at
-    /// least one.
+    /// The same surface, described from its place amid points in F, at least one.
     fn described_from(&self, points: &[Vector3<f64>]) -> Self;
 
-    /// Refuses sizes that no such surface has.
+    /// Refuses sizes outside the range of the surface.
     ///
     /// # Errors
     /// [`FitError::BadSize`].
     fn check(&self) -> Result<(), FitError>;
 
-    /// Takes points in O to F: made once for many points.
+    /// Map of points from O to F, for repeated use.
     fn to_own(&self) -> impl Fn(&Point3<f64>) -> Vector3<f64> + use<Self> {
         let (center, turn) = (self.center(), self.pose_of().rotation.to_rotation_matrix());
         move |point| turn.inverse_transform_vector(&(point - center))
     }
 
     /// Origin of F, m, in O: a point of a plane or of the axis of a cylinder, the centre of the
-    /// circle of a cone, that of a slot.
+    /// circle of a cone, or of a slot.
     fn center(&self) -> Point3<f64> {
         self.pose_of().translation.vector.into()
     }
 
-    /// The radius of its sections across its axis, m; `None` if it is flat.
+    /// Radius of its sections across its axis, m; `None` if flat.
     fn section_radius(&self) -> Option<f64> {
         None
     }
@@ -136,7 +134,7 @@ pub trait Surface: Clone {
         (value, self.pose_of().rotation * normal)
     }
 
-    /// Signed distance of a point in O and its derivatives by each freedom; 0 for those it has not.
+    /// Signed distance of a point in O and its derivatives by each freedom; 0 for missing ones.
     #[inline]
     fn derivatives(&self, point: &Point3<f64>) -> (f64, Steps) {
         self.derivatives_at(&self.pose_of().inverse_transform_point(point).coords)
@@ -164,7 +162,7 @@ pub trait Surface: Clone {
         )
     }
 
-    /// Changed by so much in each of its freedoms.
+    /// The surface after a step in each of its freedoms.
     fn moved(&self, steps: &Steps) -> Self {
         let shift = Translation3::new(steps[0], steps[1], steps[2]);
         let turn = UnitQuaternion::from_scaled_axis(Vector3::new(-steps[4], steps[3], steps[5]));
@@ -174,7 +172,7 @@ pub trait Surface: Clone {
         )
     }
 
-    /// How many freedoms it has.
+    /// Number of its freedoms.
     fn freedom_count() -> usize {
         Self::FREE.iter().filter(|free| **free).count()
     }
@@ -189,13 +187,13 @@ const fn are_named(names: [Option<&'static str>; FREEDOMS]) -> [bool; FREEDOMS] 
     free
 }
 
-/// What freedoms of several surfaces are called.
+/// Names of freedoms that several surfaces share.
 pub(super) const AXIS: Option<&str> = Some("direction of the axis");
 pub(super) const CENTRE: Option<&str> = Some("centre");
 pub(super) const RADIUS: Option<&str> = Some("radius");
 
-/// Distance of a point from the z axis and the unit vector away from it; x on the axis itself,
-/// where every one will do.
+/// Distance of a point from the z axis and the unit vector away from it; x on the axis itself, as
+/// every one will do.
 #[inline]
 pub(super) fn radial(q: &Vector3<f64>) -> (f64, Vector3<f64>) {
     let rho = q.xy().norm();
@@ -209,7 +207,7 @@ pub(super) fn radial(q: &Vector3<f64>) -> (f64, Vector3<f64>) {
     )
 }
 
-/// +1 where the material is inside (a boss), −1 where the air is (a hole).
+/// +1 for inner material (a boss), −1 for inner air (a hole).
 #[inline]
 pub(super) fn side(concave: bool) -> f64 {
     if concave { -1.0 } else { 1.0 }

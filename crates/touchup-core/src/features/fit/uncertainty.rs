@@ -5,23 +5,23 @@ use nalgebra::SymmetricEigen;
 use super::solver::{FitProblem, FreedomMatrix};
 use super::{Fit, FitError, FitParams, Freedom, Steps, Surface};
 
-/// A direction is undetermined when the observations leave it uncertain by more than the size of
-/// what was touched, or by more than 1 rad (both are 1 in scaled steps) …
+/// Maximum deviation of a determined direction: the size of the touched area, or 1 rad (both are 1
+/// in scaled steps).
 const LARGEST_DEVIATION: f64 = 1.0;
-/// … or when the freedoms in it make up for each other to this share of the information of each:
-/// below lies rounding.
+/// Minimum share of the information of each freedom in a determined direction: below, the freedoms
+/// in it make up for each other, up to rounding.
 const LEAST_SHARE: f64 = 1e-12;
-/// Groups beyond the unknowns from which on the residuals can say how large the errors are.
+/// Number of groups beyond the unknowns from which on the residuals give the size of the errors.
 pub(super) const SPARE_GROUPS: usize = 3;
 
 impl<M: Surface> Fit<M> {
-    /// Around a surface of least squares over what is kept.
+    /// Covariance around a surface of least squares over the kept observations.
     ///
     /// In steps y of one stated standard deviation along the fixed directions the stated covariance
-    /// is I. The residuals say S = g/(g − k) Σ s sᵀ over the groups, s = Σ wᵢ rᵢ ∂dᵢ/∂y over one of
-    /// them (g groups, k unknowns): the sandwich whose filling knows nothing of how errors are
-    /// correlated inside a group \[Liang and Zeger 1986\]. Eigenvalues of S below 1 are raised to
-    /// 1, so neither of the two is ever undercut.
+    /// is I. The residuals give S = g/(g − k) Σ s sᵀ over the groups, s = Σ wᵢ rᵢ ∂dᵢ/∂y over one
+    /// of them (g groups, k unknowns): the sandwich whose filling is independent of the correlation
+    /// of errors inside a group \[Liang and Zeger 1986\]. Raising the eigenvalues of S below 1 to 1
+    /// keeps the result above both.
     pub(super) fn around(
         problem: &FitProblem,
         surface: M,
@@ -61,8 +61,8 @@ impl<M: Surface> Fit<M> {
         };
         let deviations = FreedomMatrix::from_diagonal(&units) * scaled;
         let common = deviations * common * params.common_sigma;
-        // displaced together, observations displace what is fitted to them, whichever part of it
-        // they cover
+        // a common displacement of observations displaces their surface, whichever part of it they
+        // cover
         let shift = Steps::from_fn(|i, _| {
             let is_place = i <= Freedom::Z as usize;
             if is_place && M::FREE[i] {
@@ -91,7 +91,7 @@ impl<M: Surface> Fit<M> {
     }
 
     /// # Errors
-    /// [`FitError::Undetermined`] when a needed freedom is not fixed, [`FitError::BadSize`].
+    /// [`FitError::Undetermined`]: a needed freedom is not fixed; [`FitError::BadSize`].
     pub(super) fn checked(self) -> Result<Self, FitError> {
         let is_open =
             |freedom: &Freedom| M::NEEDED[*freedom as usize] && self.std(*freedom).is_none();
@@ -105,8 +105,8 @@ impl<M: Surface> Fit<M> {
 }
 
 /// In scaled steps: columns of one standard deviation along the fixed directions; and, in steps
-/// that each change the residuals by one standard deviation if taken alone, the projector onto the
-/// other directions, and these steps.
+/// that each alone change the residuals by one standard deviation, the projector onto the other
+/// directions, and these steps.
 fn directions(information: &FreedomMatrix) -> (FreedomMatrix, FreedomMatrix, Steps) {
     let alone = information
         .diagonal()
