@@ -1,8 +1,7 @@
-//! Bodies of a mesh of several: a screw in a hole does not close the hole.
+//! Bodies of a mesh: a screw in a hole does not close the hole.
 //!
-//! A body is a piece of the mesh without a border. What is asked about the surroundings of one is
-//! answered from its own faces alone. Pieces with a border are parts of one another, as in a scan:
-//! they see the whole mesh.
+//! A body is a piece of the mesh without a border. Queries around a body use its own faces alone.
+//! Pieces with a border are parts of one another, as in a scan: their queries use the whole mesh.
 
 use nalgebra::Point3;
 
@@ -11,28 +10,28 @@ use super::rays::Rays;
 use crate::mesh::{FaceId, FaceTree, TriMesh};
 use crate::numeric::{DisjointSets, distinct};
 
-/// The closed pieces of a mesh, where there is more than one piece.
+/// The closed pieces of a mesh with more than one piece.
 #[derive(Default)]
 pub(super) struct Bodies {
-    /// number of the piece of each face; empty where there is one alone
+    /// number of the piece of each face; empty for a single piece
     piece_of: Vec<u32>,
-    /// of each piece, `None` where it has a border; empty where there is one alone
+    /// body of each piece, `None` if it has a border; empty for a single piece
     bodies: Vec<Option<ClosedBody>>,
 }
 
 struct ClosedBody {
     mesh: TriMesh,
     tree: FaceTree,
-    /// their ids in the whole mesh
+    /// ids of its faces in the whole mesh
     faces: Vec<u32>,
 }
 
-/// What a place sees around it: its body, or the whole mesh.
+/// Surroundings of a place: its body, or the whole mesh.
 #[derive(Clone, Copy)]
 pub(super) struct Surroundings<'a> {
     mesh: &'a TriMesh,
     tree: &'a FaceTree,
-    /// ids in the whole mesh, where this is a body
+    /// ids in the whole mesh, for a body
     faces: Option<&'a [u32]>,
 }
 
@@ -59,12 +58,12 @@ impl Bodies {
         }
     }
 
-    /// Number of the piece that a face belongs to.
+    /// Number of the piece of a face.
     pub fn piece_of(&self, face: u32) -> u32 {
         self.piece_of.get(face as usize).copied().unwrap_or(0)
     }
 
-    /// What a face sees.
+    /// Surroundings of a face.
     pub fn around<'a>(
         &'a self,
         face: Option<u32>,
@@ -87,20 +86,19 @@ impl Bodies {
 }
 
 impl<'a> Surroundings<'a> {
-    /// The face closest to `p` when one is within `reach`, m.
+    /// The face closest to `p` within `reach`, m.
     pub fn closest(&self, p: &Point3<f64>, reach: f64) -> Option<u32> {
         let face = self.tree.closest(self.mesh, p, reach)?.face.0;
         Some(self.faces.map_or(face, |faces| faces[face as usize]))
     }
 
-    /// - `piece`: as [`Rays::new`] wants it, m.
+    /// - `piece`: as in [`Rays::new`], m.
     pub fn rays(&self, piece: f64) -> Rays<'a> {
         Rays::new(self.mesh, self.tree, piece, self.faces)
     }
 }
 
-/// The piece of each face, and the faces of each piece: those that hang together over edges of two
-/// faces.
+/// The piece of each face, and the faces of each piece: faces connected over edges with two faces.
 fn pieces(facets: &Facets) -> (Vec<u32>, Vec<Vec<u32>>) {
     let mut sets = DisjointSets::of(facets.slots());
     for (FaceId(face), _) in facets.mesh.faces() {
@@ -111,7 +109,7 @@ fn pieces(facets: &Facets) -> (Vec<u32>, Vec<Vec<u32>>) {
     }
     let (mut piece_of, mut faces) = (vec![NONE; facets.slots()], Vec::new());
     for (FaceId(face), _) in facets.mesh.faces() {
-        // the lowest face of a piece is its root, so it has its number already
+        // the root of a piece is its lowest face, so it already has its number
         let root = sets.root(face);
         if root == face {
             piece_of[face as usize] = faces.len() as u32;

@@ -1,8 +1,8 @@
-//! Where segments meet: straight edges between planes.
+//! Straight edges between planes.
 //!
 //! Between two planes of a measured mesh there is often a seam of faces that belong to neither.
-//! Each segment first grows over the faces around it that no strong segment has; where the grown
-//! ones meet near the line in which both planes intersect, there is the edge.
+//! Each segment first grows over the surrounding faces without a strong segment; an edge lies along
+//! the border of the grown segments near the intersection of both planes.
 
 use std::collections::BTreeMap;
 
@@ -25,22 +25,21 @@ pub(super) struct StraightEdge {
     pub is_convex: bool,
 }
 
-/// A seam is at most so many faces wide on each side.
+/// Maximum width of a seam on each side, faces.
 const SEAM: usize = 3;
-/// Planes meet in an edge from this angle on: sine of 15°.
+/// Sine of the minimum angle between planes of an edge: 15°.
 const SHARP: f64 = 0.26;
-/// A border is at the edge when it is within so many tolerances of the planes, or within this share
-/// of the median edge.
+/// Maximum distance of a border from the edge, in tolerances of the planes, or in median edges.
 const NEAR_TOLERANCES: f64 = 4.0;
 const NEAR_EDGES: f64 = 1.5;
-/// Pieces of an edge closer together than this are one, in median edges …
+/// Maximum gap between pieces of one edge, in median edges.
 const GAP_EDGES: f64 = 3.0;
-/// … and at least in diagonals of the mesh.
+/// The same, in diagonals of the mesh.
 const GAP: f64 = 0.005;
-/// Shortest edge, in diagonals.
+/// Minimum length of an edge, in diagonals.
 const SHORTEST: f64 = 0.02;
 
-/// The segment of each face, those of the seams too.
+/// The segment of each face, with the faces of the seams.
 pub(super) fn without_seams(parted: &Parted) -> Vec<u32> {
     let is_strong: Vec<bool> = (0..parted.segmentation.segments.len())
         .map(|number| parted.is_strong(number))
@@ -156,7 +155,7 @@ fn edges_between(parted: &Parted, planes: [usize; 2], border: &[Border]) -> Vec<
         .collect()
 }
 
-/// Whether each of two segments falls away from the other where they meet.
+/// Whether each of two segments falls away from the other at their border.
 pub(super) fn is_convex(parted: &Parted, border: &[Border], numbers: [usize; 2]) -> bool {
     let surfaces = numbers.map(|number| &parted.segment(number).primitive);
     let height = |face: u32, surface: &Primitive| {

@@ -1,6 +1,6 @@
-//! Clusters of high curvature: candidate features, before they are classified.
+//! Clusters of high curvature: candidate features, before their classification.
 //!
-//! [`paper_clusters`] is the method of the paper this crate follows; [`clusters`] finds their
+//! [`paper_clusters`] is the method of the paper this crate follows; [`clusters`] determines their
 //! number itself.
 
 use nalgebra::{Point3, Vector3};
@@ -12,7 +12,7 @@ use super::k_means::k_means;
 use crate::mesh::{TriMesh, VertexId};
 use crate::numeric::distinct;
 
-/// Vertices that belong together.
+/// Vertices of one cluster.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cluster {
     /// Mean of the vertices ([`paper_clusters`]) or of the creases by their length ([`clusters`]),
@@ -27,18 +27,18 @@ pub struct Cluster {
 /// Settings of [`paper_clusters`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PaperParams {
-    /// Vertices whose Gaussian curvature is above this in size are marked, 1/m².
+    /// Threshold of the absolute Gaussian curvature of marked vertices, 1/m².
     pub threshold: f64,
-    /// How many clusters to make.
+    /// Number of clusters.
     pub k: usize,
-    /// Of the start of k-means.
+    /// Seed of k-means.
     pub seed: u64,
 }
 
 impl Default for PaperParams {
-    /// 0.3 and 5, as printed. The paper gives no unit; its parts are in mm, so it is taken for
-    /// 0.3/mm². It leaves open the area that a defect is divided by, whether depressions with K < 0
-    /// count (here they do: |K|), and the start of k-means.
+    /// 0.3 and 5, as printed. The paper gives no unit; its parts are in mm, hence 0.3/mm² here. It
+    /// leaves open the area that divides a defect, whether depressions with K < 0 count (here they
+    /// do: |K|), and the start of k-means.
     fn default() -> Self {
         Self {
             threshold: 0.3e6,
@@ -84,15 +84,15 @@ pub fn paper_clusters(
 /// Settings of [`clusters`]; none has a unit of length.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ClusterParams {
-    /// An edge is a crease when its faces turn by more than this, rad: more than the facets of a
-    /// round hole of 12 sides (30°) and the noise of a scan, less than a chamfer (45°).
+    /// Minimum turn between the faces of a crease, rad: more than the facets of a round hole of 12
+    /// sides (30°) and the noise of a scan, less than a chamfer (45°).
     pub sharp_angle: f64,
-    /// A vertex without a crease counts when its angle defect is above this in size, rad: the tip
-    /// of a cone, a pit. Noise of a tenth of the edges makes defects of 0.3 rad.
+    /// Minimum absolute angle defect of a vertex without a crease, rad: the tip of a cone, a pit.
+    /// Noise of a tenth of the edges makes defects of 0.3 rad.
     pub sharp_defect: f64,
-    /// Creases of one kind whose distance is below this share of the diagonal of the box around the
-    /// mesh are one cluster, and creases shorter than that are dropped: gaps and specks that noise
-    /// makes.
+    /// Distance, as a share of the diagonal of the box around the mesh, below which creases of one
+    /// kind are one cluster, and minimum length of a crease: bridges gaps and drops specks from
+    /// noise.
     pub merge_share: f64,
 }
 
@@ -110,8 +110,8 @@ impl Default for ClusterParams {
 ///
 /// A crease keeps its angle and a sharp vertex its defect when the faces are split, so the number
 /// of clusters depends on neither the density of the mesh nor the unit. Connected means along
-/// creases: two rims of a hole are joined by the edges of its wall, which carry no information.
-/// Rims of an open mesh are left out.
+/// creases: edges of a wall would join two rims of a hole, but carry no information. Rims of an
+/// open mesh do not count.
 ///
 /// - `curvature`: of `mesh`, from [`super::curvature::curvature`]
 pub fn clusters(

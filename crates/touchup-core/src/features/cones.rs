@@ -1,7 +1,7 @@
-//! Cones that begin where the wall of a hole ends: countersinks, chamfers, tips of drills.
+//! Cones at the ends of the walls of holes: countersinks, chamfers, tips of drills.
 //!
-//! A short cone hardly determines its axis, that of its hole is known: so cones are searched around
-//! the ends of holes.
+//! A short cone hardly determines its axis, but its hole does: the search therefore starts at the
+//! ends of holes.
 
 use std::collections::BTreeSet;
 
@@ -15,28 +15,28 @@ use super::segment::Segment;
 use super::walls::Wall;
 use crate::numeric::{distinct, flood, median, tangent_basis};
 
-/// Directions in which the ring beyond an end is examined.
+/// Number of directions that examine the ring beyond an end.
 const AROUND: usize = 36;
-/// Rings are this much wider and narrower than the hole, as a share of the radius, and that far
-/// beyond its end.
+/// Difference of a ring's radius from the hole's, and its distance beyond the end, as a share of
+/// the radius.
 const BESIDE: f64 = 0.08;
-/// A face belongs to a ring when it is within this many radii.
+/// Maximum distance of a face from its ring, in radii.
 const NEAR: f64 = 0.15;
 /// Sines of the sharpest and of the flattest half angle, 20° and 75°: drills and countersinks have
 /// 30° to 70°.
 const SINES: [f64; 2] = [0.34, 0.966];
-/// A cone widens by at least this share of the radius.
+/// Minimum widening of a cone, as a share of the radius.
 const LEAST_WIDTH: f64 = 0.1;
-/// Faces cover at least this share of it.
+/// Minimum share of a cone that faces cover.
 const FILLED: f64 = 0.4;
-/// Sines around a ring are alike within this.
+/// Tolerance of the sines around a ring.
 const ALIKE: f64 = 0.2;
-/// So much of the ring has to be alike.
+/// Minimum share of a ring within the tolerance.
 const LEAST_SHARE: f64 = 0.5;
-/// Corners may be off a cone by this many radii, and off the first guess of it.
+/// Maximum distance of corners from a cone, and from its first guess, in radii.
 const SLACK: f64 = 0.005;
 const FIRST_SLACK: f64 = 0.05;
-/// A cone covers at least this share of a turn.
+/// Minimum share of a turn that a cone covers.
 const COVERAGE: f64 = 0.6;
 
 /// Adds the cones at both ends of each hole's wall to the segmentation and to the walls.
@@ -85,7 +85,7 @@ fn cone_beyond(parted: &Parted, wall: &Wall, end: f64, out: f64) -> Option<Segme
         // sum of the squares by which corners are off a cone, m²
         let corners = || faces.iter().flat_map(|&face| parted.facets.triangle(face));
         let misfit = |cone: &Primitive| corners().map(|p| cone.distance(&p).powi(2)).sum::<f64>();
-        // those of a measured mesh are no better than its facets
+        // the fit to a measured mesh is no better than its facets
         let drawn = parted
             .rounding
             .and_then(|_| through_corners(parted, wall, &faces, &start));
@@ -104,7 +104,7 @@ fn cone_beyond(parted: &Parted, wall: &Wall, end: f64, out: f64) -> Option<Segme
     })
 }
 
-/// Faces on a ring around the axis that face it.
+/// Faces on a ring around the axis, with normals towards it.
 fn ring(parted: &Parted, wall: &Wall, t: f64, radius: f64) -> Vec<u32> {
     let [e, g] = tangent_basis(&wall.axis);
     let around = parted.around(wall.segments[0]);
@@ -117,7 +117,7 @@ fn ring(parted: &Parted, wall: &Wall, t: f64, radius: f64) -> Vec<u32> {
     }))
 }
 
-/// The cone about the axis of the wall on which most of a ring's faces lie.
+/// The cone about the axis of the wall through most faces of a ring.
 fn cone_of(parted: &Parted, wall: &Wall, faces: &[u32], out: f64) -> Option<Primitive> {
     let along = |face: u32| parted.facets.normal(face).dot(&wall.axis) * out;
     let sine = median(&mut faces.iter().map(|&face| along(face)).collect::<Vec<_>>())?;
@@ -154,8 +154,8 @@ fn cone_from(apex: Point3<f64>, axis: &Vector3<f64>, half_angle: f64, wall: &Wal
     ))
 }
 
-/// The cone about the axis of the wall through the corners of faces: those of a coarse one lie on
-/// it, its facets do not.
+/// The cone about the axis of the wall through the corners of faces: on a coarse cone they are
+/// exact, its facets are not.
 fn through_corners(
     parted: &Parted,
     wall: &Wall,
@@ -197,7 +197,7 @@ fn is_along(cone: &Primitive, wall: &Wall) -> bool {
             .is_some_and(|apex| off(apex) < NEAR * wall.radius())
 }
 
-/// Faces that lie on the cone, from those of `seeds` on, planes and round walls left alone.
+/// Faces on the cone, connected with `seeds`, without planes and round walls.
 fn faces_on(parted: &Parted, mut seeds: Vec<u32>, cone: &Primitive, tolerance: f64) -> Vec<u32> {
     let facets = &parted.facets;
     let is_on = |face: u32| belongs(facets, face, cone, tolerance);

@@ -1,10 +1,9 @@
 //! Heads of counterbored holes by contacts: a wall around a bore, with a floor between both.
 //!
-//! A ball of radius r in a head rests on its floor and against its wall at once, and where the head
-//! is shallower than r against its edge: the force is the sum of two, and its direction is that of
-//! none of them. The place of its centre is enough: with its centre below the land around the
-//! opening the ball is r away from the wall, and h above the land it is √(r² − h²) away from the
-//! edge.
+//! A ball of radius r in a head rests on its floor and against its wall at once, and against its
+//! edge if the head is shallower than r: the force is the sum of two, with the direction of
+//! neither. The position of the centre is enough: with its centre below the land around the opening
+//! the ball is r away from the wall, and h above the land it is √(r² − h²) away from the edge.
 
 use nalgebra::{Point3, Vector3};
 
@@ -14,26 +13,26 @@ use super::measure::{Fitted, Measure};
 use super::observe::Observed;
 use crate::numeric::{median, tangent_basis};
 
-/// Heads are so many bores wide.
+/// Widths of heads, in bores.
 const HEADS: std::ops::Range<f64> = 1.15..3.5;
-/// A contact is of a wall or an edge when its normal leans towards the axis by more than this share
-/// …
+/// Minimum lean towards the axis of the normal of a contact on a wall or an edge, as a share.
 const LEAN: f64 = 0.2;
-/// … and of the floor when it leans off it by less than 25°.
+/// Cosine of the maximum lean of a contact on the floor: 25°.
 const LEVEL: f64 = 0.906;
-/// Contacts are on one circle, or one level, within this share of the ball's radius.
+/// Tolerance of one circle, or one level, of contacts, as a share of the ball's radius.
 const SEARCHED: f64 = 0.12;
-/// Parts of a turn, over what share of which wall and floor were touched, and by how many contacts.
+/// Parts of a turn; minimum shares of a turn with contacts on wall and floor; minimum number of
+/// contacts.
 const PARTS: usize = 24;
 const TURN: f64 = 0.6;
 const FLOOR_TURN: f64 = 0.4;
 const LEAST: usize = 24;
-/// A head is deeper than this share of the ball's radius, and no deeper than so many.
+/// Depths of heads, in radii of the ball.
 const DEPTHS: std::ops::Range<f64> = 0.25..3.0;
 /// A land is square to the axis within 6°.
 const SQUARE: f64 = 0.9945;
 
-/// A head.
+/// The head of a counterbored hole.
 pub(super) struct Head {
     pub wall: Fitted<Cylinder>,
     /// numbers of the touches on its floor
@@ -42,7 +41,7 @@ pub(super) struct Head {
     pub land: usize,
     /// unit vector out of it
     pub out: Vector3<f64>,
-    /// of its floor below the land, m
+    /// depth of its floor below the land, m
     pub depth: f64,
 }
 
@@ -52,7 +51,7 @@ struct Seen {
     touch: u32,
     /// height of the centre along the axis, m
     z: f64,
-    /// from the axis, m
+    /// distance from the axis, m
     rho: f64,
     /// part of a turn
     part: usize,
@@ -61,7 +60,7 @@ struct Seen {
     inward: f64,
 }
 
-/// The head around a bore that was felt, above its floor; `None` where contacts show none.
+/// The head around a touched bore, above its floor; `None` if contacts show none.
 pub(super) fn head_of(measure: &Measure, bore: &Feature) -> Option<Head> {
     let observed = measure.observed;
     let (axis, narrow) = (
@@ -136,7 +135,7 @@ fn seen_from(
     seen.collect()
 }
 
-/// Over what share of a turn contacts go.
+/// Share of a turn with contacts.
 fn turn_of<'a>(of: impl Iterator<Item = &'a Seen>) -> f64 {
     let mut parts = [false; PARTS];
     of.for_each(|one| parts[one.part] = true);
@@ -145,7 +144,7 @@ fn turn_of<'a>(of: impl Iterator<Item = &'a Seen>) -> f64 {
 
 /// The head under a land.
 ///
-/// - `narrow`, `level`, `land`: radius of the bore, m; how far along `out` the land is, m; its
+/// - `narrow`, `level`, `land`: radius of the bore, m; distance of the land along `out`, m; its
 ///   number
 #[expect(clippy::too_many_lines)]
 fn head_under(
@@ -156,7 +155,7 @@ fn head_under(
     (narrow, level, land): (f64, f64, usize),
 ) -> Option<Head> {
     let radius = observed.reach();
-    // how far the ball is from the wall or its edge
+    // distance of the ball's centre from the wall or its edge
     let away = |one: &Seen| {
         let above = (one.z - level).max(0.0);
         (above < radius).then(|| (radius * radius - above * above).sqrt())

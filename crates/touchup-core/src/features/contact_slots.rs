@@ -1,5 +1,5 @@
-//! Slots and pockets that contacts show: two straight walls that face each other over a void,
-//! whatever the mesh has between them.
+//! Slots and pockets by contacts: two straight walls that face each other over a void, whatever the
+//! mesh between them.
 //!
 //! Seen along the axis of its opening, a ball of radius r that runs along a straight wall keeps its
 //! centre on a line; beside the half-round end of a slot of width w it keeps it on a circle of
@@ -18,62 +18,63 @@ use super::slots::{LONG, LONG_BOX, SHALLOW, SQUARISH, Slot, WIDE};
 use crate::numeric::{distinct, median, order_statistic, tangent_basis, without_repeats};
 use crate::stylus::ProbedPoint;
 
-/// A wall was touched by at least so many contacts …
+/// Minimum number of contacts on a wall.
 const LEAST: usize = 8;
-/// … over so many radii of the ball, without a gap of more than so many.
+/// Minimum length of a wall, and maximum gap between its contacts, in radii of the ball.
 const LEAST_RADII: f64 = 1.5;
 const GAP_RADII: f64 = 6.0;
-/// Contacts from which a wall is tried in one group, with so many others each, and those that are
-/// counted.
+/// Maximum number of contacts to start a wall from in one group, number of partners of each, and
+/// maximum number of counted contacts.
 const STARTS: usize = 48;
 const PARTNERS: usize = 12;
 const COUNTED: usize = 1500;
-/// Of the draws.
+/// Seed of the draws.
 const SEED: u64 = 1;
-/// Most walls in one group.
+/// Maximum number of walls in one group.
 const MOST_IN_GROUP: usize = 10;
-/// A contact is on a wall within this share of the ball's radius.
+/// Tolerance of a contact on a wall, as a share of the ball's radius.
 const SEARCHED: f64 = 0.1;
 /// Walls that face each other are parallel within 6°.
 const PARALLEL: f64 = 0.9945;
-/// They face each other over this share of the longer one.
+/// Minimum overlap of facing walls, as a share of the longer one.
 const FACING: f64 = 0.4;
-/// Contacts of one wall have no gap along the axis of more than so many radii.
+/// Maximum gap along the axis between contacts of one wall, in radii.
 const LAYER_RADII: f64 = 2.5;
-/// Share of a wall's contacts above and below which its height is not counted: they may be
+/// Share of a wall's contacts, at the top and at the bottom, that its height leaves out: possible
 /// outliers.
 const OUTER: f64 = 0.05;
-/// So many contacts on something between the walls make it two voids.
+/// Minimum number of contacts on an island between the walls, which makes it two voids, and their
+/// minimum lean.
 const ISLAND: usize = 6;
 const ISLAND_LEAN: f64 = 0.7;
-/// An end was felt when so many contacts lean along the slot by more than this.
+/// Minimum number of contacts that determine an end, and their minimum lean along the slot.
 const END_CONTACTS: usize = 2;
 const END_LEAN: f64 = 0.5;
-/// A contact is off the outline at an end by this share of the ball's radius, typically, and by
-/// this much in direction.
+/// Typical distance of a contact from the outline at an end, as a share of the ball's radius, and
+/// typical error of its direction.
 const END_OFF: f64 = 0.15;
 const END_TURNED: f64 = 0.3;
-/// One contact speaks against a shape by no more than this.
+/// Maximum cost of one contact against a shape.
 const MOST_MISFIT: f64 = 9.0;
-/// It is not deeper than so many of its lengths.
+/// Maximum depth, in lengths of the slot.
 const DEEPEST: f64 = 2.0;
-/// A plane around the opening is square to the walls within 9°, and is there at this share of
-/// places beside them.
+/// A land around the opening is square to the walls within 9°; minimum share of places beside them
+/// with the land.
 const LAND: f64 = 0.988;
 const LAND_SHARE: f64 = 0.3;
-/// It is beside a wall when the mesh is there within this share of the ball's radius, at one of
-/// these distances, in radii.
+/// Tolerance of the mesh at a place of the land, as a share of the ball's radius, and distances of
+/// the places from a wall, in radii.
 const LAND_OFF: f64 = 0.3;
 const LAND_RADII: [f64; 3] = [0.5, 1.0, 2.0];
-/// Places along each wall where the surface beside it is asked for.
+/// Number of places along each wall that test the surface beside it.
 const PLACES: usize = 9;
-/// So many contacts make a floor.
+/// Minimum number of contacts of a floor.
 const FLOOR_CONTACTS: usize = 6;
-/// A floor's contacts lean less than 25°, and are no farther off its level than this share of the
-/// ball's radius.
+/// Maximum lean of a floor's contacts, 25° as a cosine, and their maximum distance from its level,
+/// as a share of the ball's radius.
 const FLOOR_LEAN: f64 = 0.906;
 const FLOOR_OFF: f64 = 0.2;
-/// It is below the walls' contacts by no more than so many radii: the ball rests on it beside them.
+/// Maximum depth of a floor below the walls' contacts, in radii: the ball rests on it beside them.
 const FLOOR_RADII: f64 = 3.0;
 
 /// A straight wall, seen along an axis.
@@ -129,8 +130,8 @@ pub(super) fn contact_slots(
             }
         }
     }
-    // of walls in pieces, and seen along several axes, those count that most contacts are on with
-    // the land beside them: flat walls are lines along every axis in both
+    // of walls in pieces or in several views, the slot with the most contacts next to its land
+    // counts: flat walls are lines along every axis in both
     found.sort_by(|(one, _), (other, _)| other.total_cmp(one));
     without_repeats(found.into_iter().map(|(_, slot)| slot), |one, other| {
         one.holds(other) || other.holds(one)
@@ -141,22 +142,22 @@ pub(super) fn contact_slots(
 struct AxisView<'a> {
     parted: &'a Parted<'a>,
     touches: &'a [ProbedPoint],
-    /// those to look at
+    /// contacts in use
     kept: &'a [usize],
     axis: Vector3<f64>,
     /// unit vectors square to the axis
     plane: [Vector3<f64>; 2],
-    /// of the ball, m
+    /// radius of the ball, m
     radius: f64,
 }
 
 /// A contact in the frame of a slot: x along it, y across, z along the axis.
 struct Local {
     touch: usize,
-    /// of the ball's centre, m
+    /// position of the ball's centre, m
     x: f64,
     y: f64,
-    /// of the contact, m
+    /// position of the contact, m
     contact_x: f64,
     contact_y: f64,
     z: f64,
@@ -166,14 +167,14 @@ struct Local {
 /// One end of a slot.
 #[derive(Clone, Copy)]
 struct SlotEnd {
-    /// where the slot ends along x, m, were it round and were it flat
+    /// end of the slot along x, m, if round and if flat
     at: [f64; 2],
-    /// how badly contacts fit either
+    /// misfit of contacts to either
     costs: [f64; 2],
 }
 
 impl AxisView<'_> {
-    /// The straight walls of some contacts, those with the most contacts first.
+    /// The straight walls of some contacts, the largest number of contacts first.
     fn lines(&self, members: &[usize]) -> Vec<Line> {
         let mut left = projected(self.touches, members, self.plane);
         let mut rng = Pcg64::seed_from_u64(SEED);
@@ -208,7 +209,7 @@ impl AxisView<'_> {
         found
     }
 
-    /// Normal of the wall that two contacts may be on.
+    /// Normal of a possible wall through two contacts.
     fn through(&self, p: &Projected, q: &Projected) -> Option<Vector2<f64>> {
         let apart = q.at - p.at;
         let length = apart.norm();
@@ -224,8 +225,7 @@ impl AxisView<'_> {
         (one.at - at).dot(normal).abs() < SEARCHED * self.radius && one.normal.dot(normal) > ALIKE
     }
 
-    /// The line through contacts near one: those that hang together along it; `None` where they are
-    /// too few.
+    /// The line through the longest connected run of contacts near a line; `None`: too few.
     fn fitted_line(
         &self,
         all: &[Projected],
@@ -273,8 +273,7 @@ impl AxisView<'_> {
         line
     }
 
-    /// The void between two walls that face each other, with the share of them that has its land
-    /// beside it.
+    /// The void between two facing walls, with the share of them next to its land.
     fn between(&self, one: &Line, other: &Line) -> Option<(Slot, f64)> {
         let across = (one.normal - other.normal).try_normalize(0.0)?;
         let gap = (other.at - one.at).dot(&across);
@@ -334,18 +333,18 @@ impl AxisView<'_> {
 /// A void between two walls, in the frame of a slot.
 struct Void<'a> {
     view: &'a AxisView<'a>,
-    /// in the middle of what was felt of both walls, m, in O
+    /// middle of the touched part of both walls, m, in O
     origin: Point3<f64>,
     /// unit vectors along and across it
     along: Vector3<f64>,
     across: Vector3<f64>,
-    /// between the lines of ball centres, m
+    /// distance between the lines of ball centres, m
     gap: f64,
-    /// both walls were felt so far to either side, m
+    /// half length of the touched overlap of both walls, m
     felt: f64,
-    /// from where to where along it at least one of them was felt, m
+    /// touched range along it of either wall, m
     reach: [f64; 2],
-    /// half of the height over which the walls were felt, m
+    /// half of the touched height of the walls, m
     half_height: f64,
 }
 
@@ -354,7 +353,7 @@ impl Void<'_> {
         self.gap + 2.0 * self.view.radius
     }
 
-    /// Those of some contacts that are in it or around its ends.
+    /// The contacts in the void or around its ends.
     fn contacts(&self, among: impl Iterator<Item = usize>) -> Vec<Local> {
         let (r, w) = (self.view.radius, self.width());
         let local = |touch: usize| {
@@ -385,7 +384,7 @@ impl Void<'_> {
         among.filter_map(local).collect()
     }
 
-    /// Where the slot ends on one side, by the contacts that lean back from there.
+    /// End of the slot on one side, by the contacts that lean back from there.
     fn end(&self, contacts: &[Local], sign: f64) -> Option<SlotEnd> {
         let (r, half) = (self.view.radius, self.gap / 2.0);
         let is_of = |one: &&Local| {
@@ -393,7 +392,7 @@ impl Void<'_> {
             is_level && one.normal.x * sign < -END_LEAN && one.x * sign > self.felt - half.max(r)
         };
         let of_end: Vec<&Local> = contacts.iter().filter(is_of).collect();
-        // another slot may end beyond: what is nearest counts
+        // another slot may end beyond: the nearest counts
         let nearest = of_end
             .iter()
             .map(|one| one.x * sign)
@@ -443,8 +442,7 @@ impl Void<'_> {
         })
     }
 
-    /// The slot or pocket, and the share of its walls that has the land beside it; `None` where it
-    /// is none.
+    /// The slot or pocket, and the share of its walls next to the land; `None`: no slot.
     #[expect(clippy::too_many_lines)]
     fn slot(&self) -> Option<(Slot, f64)> {
         let width = self.width();
@@ -452,7 +450,7 @@ impl Void<'_> {
         if self.has_island(&contacts) {
             return None;
         }
-        // what is open at an end is left to the mesh
+        // open ends are left to the mesh
         let ends = [self.end(&contacts, 1.0)?, self.end(&contacts, -1.0)?];
         let total = |shape: usize| ends[0].costs[shape] + ends[1].costs[shape];
         let shape = if total(0) <= total(1) {
@@ -521,7 +519,7 @@ impl Void<'_> {
         is_one.then(|| (slot(), land.share))
     }
 
-    /// Whether something stands between the walls.
+    /// Whether an island stands between the walls.
     fn has_island(&self, contacts: &[Local]) -> bool {
         let r = self.view.radius;
         let is_between = |one: &&Local| {
@@ -612,13 +610,13 @@ impl Void<'_> {
     }
 }
 
-/// What is around an opening.
+/// Surface around an opening.
 #[derive(Clone, Copy)]
 struct Land {
-    /// of the segment
+    /// number of the segment
     number: usize,
-    /// from the middle of the slot, m
+    /// distance from the middle of the slot, m
     distance: f64,
-    /// of the places beside the walls that are on it
+    /// share of the places beside the walls on it
     share: f64,
 }

@@ -1,12 +1,11 @@
-//! Walls that the contacts show, round and flat ones, however coarse the mesh is there.
+//! Walls by contacts, round and flat ones, however coarse the mesh is there.
 //!
 //! A ball that runs along a round wall keeps its centre at one distance ρ from the axis: ρ = R − r
 //! in a bore, R + r around a boss. Seen along the axis, two contacts with centres p, q and normals
-//! m, n (into the air) determine it: the axis goes through p + ρ m = q + ρ n, where ρ is positive
-//! in a bore and negative around a boss. Where a wall is large, what the normals are off by says
-//! little of its radius: there the circle goes through three centres. Directions of axes come of
-//! the planes of the part, on which holes stand square, and of the normals of contacts that no
-//! plane explains.
+//! m, n (into the air) determine it: the axis goes through p + ρ m = q + ρ n, with ρ positive in a
+//! bore and negative around a boss. The radius of a large wall hardly follows from noisy normals:
+//! there the circle goes through three centres. Candidate axes are the normals of the part's
+//! planes, on which holes stand square, and directions from the normals of contacts off all planes.
 
 use nalgebra::{Matrix2, Point2, Point3, Vector2, Vector3};
 use rand::{RngExt, SeedableRng};
@@ -27,52 +26,51 @@ use crate::mesh::{BoxQuery, FaceId};
 use crate::numeric::{distinct, mean, median, tangent_basis};
 use crate::stylus::ProbedPoint;
 
-/// Pairs of contacts that are examined in one group, and as many threes.
+/// Maximum number of pairs, and of triples, of contacts to try in one group.
 const PAIRS: usize = 400;
-/// Of the draws.
+/// Seed of the draws.
 const SEED: u64 = 1;
-/// The normals of a pair differ by more than this, squared: 31°; and the sides from one of three to
-/// the others meet at more than 15°.
+/// Minimum squared difference of the normals of a pair: 31°; minimum sine between the sides from
+/// one of three contacts to the others: 15°.
 const TURNED: f64 = 0.3;
 const BENT: f64 = 0.26;
-/// A contact is on a circle within this share of the ball's radius while it is searched …
+/// Tolerance of a contact on a circle in the search, as a share of the ball's radius.
 const SEARCHED: f64 = 0.1;
-/// … and its normal within 35°.
+/// Cosine of the tolerance of its normal: 35°.
 const RADIAL: f64 = 0.82;
 /// Parts of a turn.
 const PARTS: usize = 24;
-/// A cylinder was touched over at least this share of a turn.
+/// Minimum touched share of a turn of a cylinder.
 const TURN: f64 = 0.42;
-/// Contacts from which a flat wall is tried, of one group.
+/// Maximum number of contacts to start a flat wall from, in one group.
 const STARTS: usize = 40;
-/// A flat wall is at least so many radii of the ball long, and its contacts determine a tilt when
-/// they are this wide, in radii.
+/// Minimum length of a flat wall, and width from which its contacts determine a tilt, in radii of
+/// the ball.
 const FLAT_RADII: f64 = 1.5;
 const WIDE_RADII: f64 = 0.25;
-/// No more of a flat wall than this share is round in the mesh.
+/// Maximum share of a flat wall that is round in the mesh.
 const MOST_ROUND: f64 = 0.3;
-/// Most walls of one kind in one group.
+/// Maximum number of walls of one kind in one group.
 const MOST_IN_GROUP: usize = 6;
-/// Radii between these many radii of the ball.
+/// Range of radii, in radii of the ball.
 const RADII: [f64; 2] = [1.02, 40.0];
-/// Faces of the mesh are of the cylinder within this share of the ball's radius, and as far beyond
-/// its ends.
+/// Maximum distance of a cylinder's faces from it, and beyond its ends, as a share of the ball's
+/// radius.
 const MESH_OFF: f64 = 0.25;
 const MESH_BEYOND: f64 = 0.6;
-/// Two cylinders are one when radii and places agree within this share of the radius.
+/// Tolerance of radii and positions of one cylinder, as a share of the radius.
 const SAME: f64 = 0.12;
-/// A round piece of the mesh is of the same wall when radii and places agree within this share of
-/// the radius, and of that of the ball: a scan is blurred, and steps of a hole or shaft differ by
-/// more.
+/// Tolerance of radii and positions between a wall and its round piece of the mesh, as a share of
+/// the radius, and of the ball's: a scan is blurred, and steps of a hole or shaft differ by more.
 const SAME_WALL: f64 = 0.15;
 const SAME_WALL_OF_BALL: f64 = 0.35;
-/// Contacts among which a shaft is sought, at most, its radius in radii of the ball, and the share
-/// of a turn over which it was touched.
+/// Maximum number of contacts in the search for a shaft, its minimum radius in radii of the ball,
+/// and its minimum touched share of a turn.
 const MOST_ON_SHAFT: usize = 800;
 const LARGE: f64 = 4.0;
 const SHAFT_TURN: f64 = 0.6;
-/// Pieces of one wall are about one axis within 6°, and no farther apart along it than this many of
-/// its radii.
+/// Tolerance of the axes of pieces of one wall, 6° as a cosine, and maximum gap along the axis, in
+/// radii of the wall.
 const ONE_AXIS: f64 = 0.9945;
 const APART: f64 = 1.0;
 /// Tolerance of the segment of such a wall, as a share of the ball's radius.
@@ -103,8 +101,8 @@ struct ContactWalls {
     planes: Vec<ContactPlane>,
 }
 
-/// Adds the walls that contacts show to the segmentation: each takes the faces of the mesh that lie
-/// on it. Returns for each contact whether it is on a wall that is round all around.
+/// Adds the walls that contacts show to the segmentation, each with the faces of the mesh on it.
+/// Returns for each contact whether it is on a wall that is round all around.
 pub(super) fn add_contact_walls(parted: &mut Parted, touches: &[ProbedPoint]) -> Vec<bool> {
     let radius = touches.iter().map(|touch| touch.radius).fold(0.0, f64::max);
     let ContactWalls { cylinders, planes } = contact_walls(parted, touches);
@@ -150,8 +148,8 @@ pub(super) fn add_contact_walls(parted: &mut Parted, touches: &[ProbedPoint]) ->
     is_round
 }
 
-/// Faces of the round pieces of the mesh that are the same wall, or the rest of it that nobody
-/// touched: one wall is one feature.
+/// Faces of the mesh's round pieces of the same wall, with its untouched rest: one wall is one
+/// feature.
 fn faces_of_same(parted: &Parted, found: &ContactCylinder, of_ball: f64) -> Vec<u32> {
     let Cylinder {
         radius, concave, ..
@@ -223,7 +221,7 @@ fn faces_by(parted: &Parted, found: &ContactPlane, touches: &[ProbedPoint]) -> V
     }
 }
 
-/// Faces of the mesh on a cylinder, as far as it was touched.
+/// Faces of the mesh on a cylinder, within its touched length.
 fn faces_on(parted: &Parted, found: &ContactCylinder, radius: f64) -> Vec<u32> {
     let Cylinder {
         radius: of_wall, ..
@@ -264,7 +262,7 @@ impl ContactWalls {
         }
     }
 
-    /// Joins cylinders that go on one another: a bore that was felt in pieces is one.
+    /// Joins cylinders along one axis: a bore touched in pieces is one.
     fn join_pieces(&mut self, touches: &[ProbedPoint], radius: f64, group_of: &[u32]) {
         let mut at = 0;
         while at < self.cylinders.len() {
@@ -318,7 +316,7 @@ impl ContactWalls {
     }
 }
 
-/// All walls that contacts show, those with the most contacts first.
+/// All walls that contacts show, the largest number of contacts first.
 fn contact_walls(parted: &Parted, touches: &[ProbedPoint]) -> ContactWalls {
     let kept = thinned(touches);
     let Some(radius) = kept.first().map(|&at| touches[at].radius) else {
@@ -344,7 +342,7 @@ fn contact_walls(parted: &Parted, touches: &[ProbedPoint]) -> ContactWalls {
                 found.add(one);
             }
         }
-        // a shaft is touched in strips that are far apart
+        // touches of a shaft come in strips that are far apart
         let walls: Vec<usize> = walls.into_iter().filter(|&at| left[at]).collect();
         let some: Vec<usize> = walls
             .iter()
@@ -377,7 +375,7 @@ fn contact_walls(parted: &Parted, touches: &[ProbedPoint]) -> ContactWalls {
     found
 }
 
-/// The planes that contacts lie on.
+/// The planes through contacts.
 fn flat_walls(touches: &[ProbedPoint], mut left: Vec<usize>) -> Vec<ContactPlane> {
     let mut found = Vec::new();
     while found.len() < MOST_IN_GROUP && left.len() >= LEAST {
@@ -417,8 +415,8 @@ fn flat_walls(touches: &[ProbedPoint], mut left: Vec<usize>) -> Vec<ContactPlane
     found
 }
 
-/// Whether contacts that lie on a plane are those of an edge: rolling around it moves the centre
-/// and hardly the contact, and in a corner the normal turns while the centre stays.
+/// Whether contacts on a plane are on an edge: rolling around it moves the centre and hardly the
+/// contact, and in a corner the normal turns while the centre stays.
 fn is_edge(touches: &[ProbedPoint], members: &[usize], plane: &Plane) -> bool {
     let radius = touches[members[0]].radius;
     let basis = tangent_basis(&plane.normal());
@@ -446,15 +444,15 @@ fn is_edge(touches: &[ProbedPoint], members: &[usize], plane: &Plane) -> bool {
     is_rolled || is_corner
 }
 
-/// Contacts of an edge: the centre moves by more than this many radii across it, the contact by
-/// less than this share of that. Contacts of a corner: the centre moves by less than this many
-/// radii across it while the normals turn by more, rad.
+/// Contacts of an edge: minimum motion of the centre across it, in radii, and maximum motion of the
+/// contact, as a share of that. Contacts of a corner: maximum motion of the centre across it, in
+/// radii, and minimum turn of the normals, rad.
 const ROLLED: f64 = 0.05;
 const ROLLED_SHARE: f64 = 0.6;
 const CORNER: f64 = 0.1;
 const CORNER_TURN: f64 = 0.12;
 
-/// The plane through contacts; across what they do not determine their normals do.
+/// The plane through contacts; in undetermined directions by their normals.
 fn plane_through(touches: &[ProbedPoint], members: &[usize]) -> Option<Plane> {
     let normal: Vector3<f64> = members.iter().map(|&at| touches[at].normal).sum();
     let normal = normal.try_normalize(0.0)?;
@@ -495,7 +493,7 @@ fn extent(touches: &[ProbedPoint], members: &[usize]) -> f64 {
     bounds.map_or(0.0, |[low, high]| (high - low).norm())
 }
 
-/// The circles that contacts lie on, seen along an axis, with the contacts of each.
+/// The circles through contacts, seen along an axis, with the contacts of each.
 fn circles(
     touches: &[ProbedPoint],
     members: &[usize],
@@ -538,8 +536,8 @@ fn is_on_circle(one: &Projected, centre: &Point2<f64>, rho: f64, radius: f64) ->
         && v.dot(&one.normal) * rho.signum() > RADIAL * distance
 }
 
-/// The circle of ball centres on which most of a turn was touched: its centre and ρ, m, and the
-/// share of the turn; `None` where none was over enough of it.
+/// The circle of ball centres with the largest touched share of a turn: its centre and ρ, m, and
+/// that share; `None`: the share is too small.
 fn best_circle(all: &[Projected], radius: f64) -> Option<(Point2<f64>, f64, f64)> {
     let mut best: Option<(usize, usize, Point2<f64>, f64)> = None;
     // the same contacts give the same circles
@@ -594,7 +592,7 @@ fn circle_of_two(one: &Projected, other: &Projected) -> Option<(Point2<f64>, f64
     ))
 }
 
-/// The circle through three centres; its sign is that of the first normal.
+/// The circle through three centres; its sign is from the first normal.
 fn circle_of_three([one, other, third]: [&Projected; 3]) -> Option<(Point2<f64>, f64)> {
     let (a, b) = (other.at - one.at, third.at - one.at);
     let twice_area = a.perp(&b);
@@ -611,7 +609,7 @@ fn circle_of_three([one, other, third]: [&Projected; 3]) -> Option<(Point2<f64>,
     ))
 }
 
-/// How many contacts are on a circle, and over how many parts of a turn.
+/// Number of contacts on a circle, and of touched parts of a turn.
 fn support(all: &[Projected], centre: &Point2<f64>, rho: f64, radius: f64) -> (usize, usize) {
     let (mut parts, mut count) = ([false; PARTS], 0);
     for one in all
@@ -649,7 +647,7 @@ fn fitted_circle(
     (square > 0.0).then(|| (centre + moved, square.sqrt().copysign(rho)))
 }
 
-/// The cylinder about a circle, its axis fitted too where the contacts determine it.
+/// The cylinder about a circle, with a fitted axis if the contacts determine it.
 fn cylinder_of(
     touches: &[ProbedPoint],
     numbers: &[u32],
@@ -696,7 +694,7 @@ fn cylinder_of(
     })
 }
 
-/// How well the direction of an axis is known before its contacts are, rad: 3°.
+/// Prior standard deviation of the direction of an axis, rad: 3°.
 const AXIS_SIGMA: f64 = 0.05;
 
 fn is_same(one: &ContactCylinder, other: &ContactCylinder) -> bool {

@@ -1,5 +1,5 @@
-//! Contacts seen as evidence of walls: thinned out, parted into those that hang together, seen
-//! along the axes that walls may stand along.
+//! Contacts as evidence of walls: thinning, connected groups, and projection along possible axes of
+//! walls.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -10,23 +10,23 @@ use super::scene::Parted;
 use crate::numeric::{DisjointSets, PointGrid, VoxelKey, spreads, voxel_of};
 use crate::stylus::ProbedPoint;
 
-/// Of contacts closer together than this share of the ball's radius one is enough.
+/// Cell size of thinning, as a share of the ball's radius: one contact is enough.
 const THIN: f64 = 0.25;
-/// A contact is on a plane when it is off it by no more than so many standard deviations, or this
-/// share of the radius, m …
+/// Maximum distance of a contact from its plane, in standard deviations, or as a share of the
+/// radius.
 const ON_PLANE_SIGMAS: f64 = 4.0;
 const ON_PLANE: f64 = 0.06;
-/// … and its normal is off by less than 25°.
+/// Cosine of the tolerance of its normal: 25°.
 pub(super) const ALIKE: f64 = 0.906;
-/// Contacts no farther apart than so many radii of the ball hang together.
+/// Maximum distance of connected contacts, in radii of the ball.
 pub(super) const TOGETHER: f64 = 1.6;
 /// A wall's contacts are square to its axis within 20°: friction and noise.
 pub(super) const SQUARE: f64 = 0.34;
 /// Directions of axes are the same within 3°.
 const SAME_AXIS: f64 = 0.9986;
-/// So many directions of planes are examined, those of the largest first.
+/// Maximum number of axes, the largest planes first.
 const MOST_AXES: usize = 12;
-/// A wall was touched by at least so many contacts.
+/// Minimum number of contacts on a wall.
 pub(super) const LEAST: usize = 12;
 
 /// A contact seen along an axis.
@@ -58,7 +58,7 @@ pub(super) fn projected(
     members.iter().filter_map(project).collect()
 }
 
-/// Contacts to look at: one of those that are close together.
+/// Thinned contacts: one per cell.
 pub(super) fn thinned(touches: &[ProbedPoint]) -> Vec<usize> {
     let mut seen = BTreeSet::<VoxelKey>::new();
     let mut is_new = |touch: &ProbedPoint| seen.insert(voxel_of(&touch.point, THIN * touch.radius));
@@ -68,7 +68,7 @@ pub(super) fn thinned(touches: &[ProbedPoint]) -> Vec<usize> {
         .collect()
 }
 
-/// Numbers of the planes that holes may stand on, the largest first.
+/// Numbers of the planes under possible holes, the largest first.
 pub(super) fn large_planes(parted: &Parted) -> Vec<usize> {
     let mut numbers: Vec<usize> = parted
         .planes()
@@ -89,7 +89,7 @@ pub(super) fn is_on(parted: &Parted, number: usize, touch: &ProbedPoint) -> bool
         && plane.normal().dot(&touch.normal) > ALIKE
 }
 
-/// Directions that axes may have.
+/// Candidate directions of axes.
 pub(super) fn axes(
     parted: &Parted,
     planes: &[usize],
@@ -127,13 +127,13 @@ pub(super) fn axes(
     axes
 }
 
-/// Contacts that hang together: no farther apart than `reach`, m.
+/// Groups of connected contacts: no farther apart than `reach`, m.
 pub(super) fn together(touches: &[ProbedPoint], numbers: &[usize], reach: f64) -> Vec<Vec<usize>> {
     hanging(numbers, |at| touches[at].point, reach, |_, _| true)
 }
 
-/// Contacts of walls along an axis that hang together, seen along it: one wall, whether it was felt
-/// from above, from below or from both. The normals of those that hang together directly are alike.
+/// Groups of connected contacts of walls along an axis, in the view along it: one wall, touched
+/// from above, below or both. Direct neighbours have like normals.
 pub(super) fn together_along(
     touches: &[ProbedPoint],
     numbers: &[usize],

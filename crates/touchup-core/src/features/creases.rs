@@ -1,4 +1,4 @@
-//! Edges at which a mesh turns sharply, and how they are connected.
+//! Sharp edges of a mesh, and their connections.
 
 use nalgebra::Vector3;
 
@@ -7,8 +7,8 @@ use super::facets::Facets;
 use crate::mesh::{TriMesh, VertexId};
 use crate::numeric::{DisjointSets, voxel_neighbourhood, voxel_of};
 
-/// Points put on all creases together at most, beside one for each: bounds the work on meshes that
-/// are all noise.
+/// Maximum number of points on all creases together, beside one for each: bounds the work on meshes
+/// of pure noise.
 const MOST_POINTS: f64 = 1e6;
 
 /// Sign of the bend: convex or concave.
@@ -95,9 +95,8 @@ impl Creases {
         regions
     }
 
-    /// Joins creases of one kind of which points are in one cell of a grid of size `near`, or in
-    /// cells that touch: all that are closer than `near`, none that are farther than 2√3 times
-    /// that.
+    /// Joins creases of one kind with points in one cell of a grid of size `near`, or in adjacent
+    /// cells: all that are closer than `near`, none that are farther than 2√3 times that.
     pub fn merge(&self, regions: &mut DisjointSets, mesh: &TriMesh, near: f64) {
         let lengths = |crease: &Crease| {
             (mesh.position(crease.ends[1]) - mesh.position(crease.ends[0])).norm()
@@ -129,7 +128,7 @@ impl Creases {
     }
 }
 
-/// Sorts by key and joins what has the same.
+/// Sorts by key and joins equal keys.
 fn join_equal<K: Ord + Copy>(sets: &mut DisjointSets, keyed: &mut [(K, u32)]) {
     keyed.sort_unstable();
     for pair in keyed.windows(2).filter(|pair| pair[0].0 == pair[1].0) {

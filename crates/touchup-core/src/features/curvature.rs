@@ -1,10 +1,10 @@
 //! Curvature at the vertices of a mesh.
 //!
-//! Gaussian: the angle defect 2π − Σθ over the angles θ at the vertex is its integral over the part
-//! of the surface that belongs to the vertex; over a closed mesh the defects sum to 2πχ (Gauss and
-//! Bonnet), whatever the density. Mean: half the gradient of the area when the vertex moves along
-//! its normal is the integral of H; it is positive on bumps and negative in depressions, which the
-//! Gaussian curvature does not distinguish.
+//! Gaussian: the angle defect 2π − Σθ over the angles θ at the vertex is its integral over the
+//! vertex's part of the surface; over a closed mesh the defects sum to 2πχ (Gauss and Bonnet),
+//! whatever the density. Mean: half the gradient of the area when the vertex moves along its normal
+//! is the integral of H; it is positive on bumps and negative in depressions, which the Gaussian
+//! curvature does not distinguish.
 //!
 //! The area is the mixed Voronoi area of \[Meyer et al. 2003\]: with it a ring of acute triangles
 //! inscribed in a sphere has K = 1/r² to second order in its edges, whatever its shape.
@@ -16,7 +16,7 @@ use nalgebra::{Point3, Vector3};
 
 use crate::mesh::{TriMesh, VertexId};
 
-/// How the faces around a vertex meet.
+/// Arrangement of the faces around a vertex.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum VertexKind {
     /// One closed fan, all faces with the same orientation.
@@ -35,20 +35,20 @@ pub enum VertexKind {
 /// Curvature at one vertex.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct VertexCurvature {
-    /// How its faces meet.
+    /// Arrangement of its faces.
     pub kind: VertexKind,
-    /// Integral of the Gaussian curvature, rad: 2π − Σθ; on the rim π − Σθ (turn of the rim); 0
-    /// where irregular.
+    /// Integral of the Gaussian curvature, rad: 2π − Σθ; on the rim π − Σθ (turn of the rim); 0 if
+    /// irregular.
     pub defect: f64,
     /// Integral of the mean curvature, m; positive on bumps, negative in depressions; 0 on the rim
-    /// and where irregular.
+    /// and if irregular.
     pub integrated_mean: f64,
     /// Mixed Voronoi area, m².
     pub area: f64,
 }
 
 impl VertexCurvature {
-    /// Gaussian curvature κ₁κ₂, 1/m²; 0 on the rim and where the area is 0.
+    /// Gaussian curvature κ₁κ₂, 1/m²; 0 on the rim and for area 0.
     pub fn gaussian(&self) -> f64 {
         if self.kind == VertexKind::Inner && self.area > 0.0 {
             self.defect / self.area
@@ -57,7 +57,7 @@ impl VertexCurvature {
         }
     }
 
-    /// Mean curvature (κ₁ + κ₂)/2, 1/m; positive on bumps; 0 on the rim and where the area is 0.
+    /// Mean curvature (κ₁ + κ₂)/2, 1/m; positive on bumps; 0 on the rim and for area 0.
     pub fn mean(&self) -> f64 {
         if self.kind == VertexKind::Inner && self.area > 0.0 {
             self.integrated_mean / self.area
@@ -79,17 +79,17 @@ pub fn curvature(mesh: &TriMesh) -> Vec<VertexCurvature> {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Fan {
     links: Vec<[u32; 2]>,
-    /// the face that begins where each one ends
+    /// the next face after each one
     next: Vec<u32>,
 }
 
-/// Fans up to this size are searched all at once, larger ones by halves.
+/// Maximum size of fans for a linear search; larger ones use bisection.
 const SMALL_FAN: usize = 8;
 /// More than the sum of all places in one.
 const COUNTED: u32 = 64;
 
 impl Fan {
-    /// Curvature at one vertex: what an edit changes are the vertices of the moved faces.
+    /// Curvature at one vertex: an edit changes the vertices of the moved faces.
     #[inline]
     pub fn curvature(&mut self, mesh: &TriMesh, vertex: VertexId) -> VertexCurvature {
         self.gather(mesh, vertex);
@@ -114,7 +114,7 @@ impl Fan {
         }
     }
 
-    /// The neighbours after and after that in each face.
+    /// The next two neighbours in each face.
     #[inline]
     fn gather(&mut self, mesh: &TriMesh, vertex: VertexId) {
         self.links.clear();
@@ -136,8 +136,8 @@ impl Fan {
         if !self.link_up() {
             return self.kind_of_open();
         }
-        // one round must come past all faces, and is back at the first no later; where two faces
-        // end alike it never is
+        // one round must pass all faces, and is back at the first no later; with two faces of the
+        // same end it never is
         let (mut at, mut steps) = (self.next[0], 1);
         while at != 0 && steps < count {
             (at, steps) = (self.next[at as usize], steps + 1);
@@ -149,7 +149,7 @@ impl Fan {
         }
     }
 
-    /// Fills `next`; whether each face has exactly one.
+    /// Fills `next`; returns whether each face has exactly one.
     #[inline]
     fn link_up(&mut self) -> bool {
         self.next.clear();
@@ -164,7 +164,7 @@ impl Fan {
         }
         let mut sound = true;
         self.next.extend(self.links.iter().map(|&[_, end]| {
-            // how many were found, and the sum of their places, in one number
+            // number of matches, and the sum of their places, in one number
             let found =
                 |(i, &start): (usize, &u32)| if start == end { COUNTED + i as u32 } else { 0 };
             let places: u32 = starts.iter().enumerate().map(found).sum();
@@ -192,7 +192,7 @@ impl Fan {
             .all(|pair| count(pair) == 1)
     }
 
-    /// On the rim one face begins where none ends; from there the walk must come past all.
+    /// On the rim one face begins without a predecessor; from there the walk must pass all.
     #[cold]
     fn kind_of_open(&self) -> VertexKind {
         let (mut starts, mut ends) = (self.links.clone(), self.links.clone());
@@ -227,10 +227,10 @@ impl Fan {
 
 /// Sums over the corners at one vertex.
 struct CornerSums {
-    /// sum of angles: argument of the product of complex numbers …
+    /// sum of angles: argument of the product of complex numbers
     re: f64,
     im: f64,
-    /// … and how often it came round
+    /// full turns of that product
     turns: u32,
     /// 1/m²: makes these numbers of order one
     scale: f64,
@@ -239,7 +239,7 @@ struct CornerSums {
     area_gradient: Vector3<f64>,
 }
 
-/// Products outside this range are brought back to 1, long before they overflow.
+/// Products outside this range are scaled back to 1, long before they overflow.
 const MAGNITUDES: std::ops::Range<f64> = 1e-100..1e100;
 /// Up to this tangent the series of the arc tangent to the 17th power is exact: the next term is
 /// below 2⁻⁶¹ of the angle.
@@ -292,9 +292,9 @@ impl CornerSums {
         self.area_gradient -= vector(&corners.gradient);
     }
 
-    /// Turns the product by an angle of 0 to π of any length. It comes round where it passes the
-    /// negative half of the real axis. Each corner adds a rounding or two to the angle, and no arc
-    /// tangent is needed.
+    /// Turns the product by an angle of 0 to π of any length. A full turn counts at the negative
+    /// half of the real axis. Each corner adds a rounding or two to the angle, without an arc
+    /// tangent.
     #[inline]
     fn turn(&mut self, cos: f64, sin: f64) {
         let (re, im) = (self.re * cos - self.im * sin, self.re * sin + self.im * cos);
@@ -307,7 +307,7 @@ impl CornerSums {
         }
     }
 
-    /// The same with both brought to length 1 first; an angle of no length is none.
+    /// As `turn`, with both scaled to length 1 first; an angle of no length is none.
     #[cold]
     fn turn_extreme(&mut self, cos: f64, sin: f64) {
         let (length, own) = (cos.hypot(sin), self.re.hypot(self.im));
@@ -349,7 +349,7 @@ fn argument(re: f64, im: f64) -> f64 {
     t + t * tt * series
 }
 
-/// Two numbers, reckoned with at once.
+/// Two numbers, for operations on both at once.
 type Two = [f64; 2];
 
 #[inline]
@@ -357,8 +357,7 @@ fn two(of: impl Fn(usize) -> f64) -> Two {
     [of(0), of(1)]
 }
 
-/// What two faces have at one of their corners each, at once: one wide instruction does the same
-/// sum for both.
+/// Quantities at one corner of each of two faces: one wide instruction does the same sum for both.
 struct Corners {
     cos: Two,
     sin: Two,
@@ -380,7 +379,7 @@ impl Corners {
             [(1, 2), (2, 0), (0, 1)].map(|(j, k)| two(|i| e[j][i] * f[k][i] - e[k][i] * f[j][i]));
         let (cos, square) = (dot(&e, &f), dot(&normal, &normal));
         let sin = two(|i| square[i].sqrt());
-        // without area nothing is added
+        // a corner without area adds nothing
         let per_sin = two(|i| if sin[i] > 0.0 { 1.0 / sin[i] } else { 0.0 });
         let (ee, ff) = (dot(&e, &e), dot(&f, &f));
         // e·(e − f) and f·(f − e): the cosines at the two other corners; over sin, their cotangents
@@ -400,7 +399,7 @@ impl Corners {
     }
 }
 
-/// What a corner has of its triangle: the part nearest to it, or of an obtuse triangle half (the
+/// Share of a corner in its triangle: the part nearest to it, or of an obtuse triangle half (the
 /// obtuse corner) or a quarter (the others) of all. `sin` is twice the area of the triangle, the
 /// cosines those at the three corners.
 #[inline]

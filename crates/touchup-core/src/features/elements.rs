@@ -10,11 +10,11 @@ use super::observe::NOT_ALIKE;
 use crate::form::{Element, FlatForm, FormPoint, RoundForm, Shape, flat_form, round_form};
 use crate::numeric::{distinct, tangent_basis};
 
-/// Directions in which the outermost touches of a plane are taken.
+/// Number of directions of the outermost touches of a plane.
 const CORNERS: usize = 16;
 
-/// Covariance in O of what a fit says of point and direction, m and rad: without what all touches
-/// have in common.
+/// Covariance in O of point and direction of a fit, m and rad: without the common errors of all
+/// touches.
 fn own_covariance<S: Surface>(fit: &Fit<S>) -> Matrix6<f64> {
     let rotation = fit.surface.pose_of().rotation.to_rotation_matrix();
     // the freedoms in their order: shifts along x, y, z of F, z leans towards x and y
@@ -29,7 +29,7 @@ fn own_covariance<S: Surface>(fit: &Fit<S>) -> Matrix6<f64> {
 }
 
 impl Measure<'_> {
-    /// The points on a surface that its touches say, as it is: where their balls touch it.
+    /// Touched points on the true surface: contacts of the balls.
     fn form_points<S: Surface>(&self, fitted: &Fitted<S>) -> Vec<FormPoint> {
         let on_surface = |o: super::fit::Observation| {
             let (_, normal) = fitted.surface.distance_and_normal(&o.point);
@@ -46,8 +46,8 @@ impl Measure<'_> {
             .collect()
     }
 
-    /// Roundness, cylindricity and straightness of a wall that was fitted to touches; in a drawing
-    /// that nobody touched the roundness of its corners.
+    /// Roundness, cylindricity and straightness of a wall fitted to touches; in an untouched
+    /// drawing the roundness of its corners.
     ///
     /// - `segments`: of the wall.
     pub fn round_form(&self, fitted: &Fitted<Cylinder>, segments: &[usize]) -> Option<RoundForm> {
@@ -62,8 +62,8 @@ impl Measure<'_> {
         is_drawn.then(|| RoundForm::of_section(corners, &centre, &axis))?
     }
 
-    /// How far the facets of a drawing lie inside the surface through their corners, m; `None`
-    /// if they do not, and of a mesh that was measured.
+    /// Distance of a drawing's facets inside the surface through their corners, m; `None` if on it,
+    /// and for a measured mesh.
     pub fn facets(&self, surface: &impl Surface, segments: &[usize]) -> Option<f64> {
         let parted = self.observed.parted;
         let rounding = parted.rounding?;
@@ -80,14 +80,14 @@ impl Measure<'_> {
         Some(off.fold(0.0, f64::max)).filter(|&off| off > SEEN_FACETS * rounding)
     }
 
-    /// Flatness of a plane that was fitted to touches.
+    /// Flatness of a plane fitted to touches.
     pub fn flat_form(&self, fitted: &Fitted<Plane>) -> Option<FlatForm> {
         let points = self.form_points(fitted);
         flat_form(&points, &fitted.surface.point(), &fitted.surface.normal())
             .filter(|_| fitted.to == FittedTo::Touches)
     }
 
-    /// The axis of a wall that was fitted to touches, over the heights of these.
+    /// The axis of a wall fitted to touches, over the heights of these.
     pub fn axis_element(&self, fitted: &Fitted<Cylinder>) -> Option<Element> {
         let direction = fitted.surface.axis();
         let places = self.touched_places(fitted)?;
@@ -106,7 +106,7 @@ impl Measure<'_> {
         self.element(fitted, Shape::Axis, extent)
     }
 
-    /// A plane that was fitted to touches, as far as these reach.
+    /// A plane fitted to touches, within the extent of these.
     pub fn plane_element(&self, fitted: &Fitted<Plane>) -> Option<Element> {
         let normal = fitted.surface.normal();
         let [u, v] = tangent_basis(&normal);
@@ -141,7 +141,7 @@ impl Measure<'_> {
         let fit = fitted.confirmed()?;
         let direction = fit.surface.axis();
         let [calibration, shift] = self.observed.systematic(&fitted.touches);
-        // of what touches have in common, those of another surface have not all
+        // touches of another surface share only a part of the common errors
         let alone = NOT_ALIKE * calibration.hypot(shift);
         let mut covariance = own_covariance(fit);
         let free = [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| match shape {

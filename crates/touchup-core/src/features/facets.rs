@@ -4,11 +4,11 @@ use nalgebra::{Point3, Vector3};
 
 use crate::mesh::{FaceId, TriMesh, VertexId};
 
-/// No face lies across this edge: the mesh ends, more than two faces meet, or the one there is
-/// turned over. Of a face: no segment, no piece.
+/// No face lies across this edge: the mesh ends, more than two faces meet, or the neighbour is
+/// turned over. For a face: no segment, no piece.
 pub(super) const NONE: u32 = u32::MAX;
 
-/// All faces of a mesh, by id; each question has an array of its own, so that asking one does not
+/// All faces of a mesh, by id; each property has an array of its own, so that reading one does not
 /// load the others.
 #[derive(Clone, Debug)]
 pub(super) struct Facets<'a> {
@@ -56,7 +56,7 @@ impl<'a> Facets<'a> {
         }
     }
 
-    /// Number of faces, removed ones counted.
+    /// Number of faces, with removed ones.
     pub fn slots(&self) -> usize {
         self.areas.len()
     }
@@ -84,7 +84,7 @@ impl<'a> Facets<'a> {
             .filter(|&(_, other)| other != NONE)
     }
 
-    /// Numbers of the edges of a face that have no other face at all.
+    /// Numbers of the edges of a face without any other face.
     pub fn open_edges(&self, face: u32) -> impl Iterator<Item = usize> + '_ {
         let corners = self.mesh.corners(FaceId(face));
         let beside = self.beside[face as usize];
@@ -115,7 +115,7 @@ struct VertexFan {
     faces: Vec<(u32, usize)>,
 }
 
-/// So many neighbours are compared at once; places without one have no number of a vertex.
+/// Number of neighbours compared at once; places without one have no number of a vertex.
 const AT_ONCE: usize = 8;
 
 impl VertexFan {
@@ -141,8 +141,8 @@ impl VertexFan {
             }));
     }
 
-    /// The place of the face across the edge to vertex `next`, when there is that one and no third,
-    /// and it runs along it in the opposite direction.
+    /// The place of the face across the edge to vertex `next`, if it is the only one and runs along
+    /// it in the opposite direction.
     fn across(&self, next: u32) -> Option<usize> {
         let (mut faces, mut place) = (0, 0);
         let (before, after) = (
@@ -167,7 +167,7 @@ impl VertexFan {
         }
     }
 
-    /// Sets what is across each edge between the vertex and a later one.
+    /// Sets the faces across each edge between the vertex and a later one.
     fn join(&self, vertex: VertexId, beside: &mut [[u32; 3]]) {
         for (&(face, edge), &next) in self
             .faces
@@ -176,7 +176,7 @@ impl VertexFan {
             .filter(|&(_, &next)| next > vertex.0)
         {
             if let Some(place) = self.across(next) {
-                // its edge to this vertex ends where the one from here begins
+                // its edge to this vertex ends at the start of the one from here
                 let (other, its_edge) = self.faces[place];
                 beside[face as usize][edge] = other;
                 beside[other as usize][(its_edge + 2) % 3] = face;

@@ -1,20 +1,20 @@
-//! The flat pieces of a drawing: faces that lie in one plane and hang together.
+//! The flat pieces of a drawing: connected faces in one plane.
 
 use super::facets::{Facets, NONE};
 use crate::numeric::flood;
 
-/// Across a sharper edge than this no region grows, and a normal may be off by no more: half of a
-/// polygon of 9 sides. 40°.
+/// Cosine of the maximum angle across an edge inside a region, and of a face's normal from its
+/// plane: half of a polygon of 9 sides, 40°.
 pub(super) const SMOOTH: f64 = 0.766;
-/// A mesh is a drawing when this share of its faces lies in one plane with a neighbour …
+/// Minimum share of a drawing's faces in one plane with a neighbour.
 const DRAWN_SHARE: f64 = 0.2;
-/// … within this, 1 − cos: 0.01°, what single precision makes of small faces.
+/// Tolerance of one plane, 1 − cos: 0.01°, the effect of single precision on small faces.
 const COPLANAR: f64 = 1.5e-8;
 
-/// Flat pieces, each found when it is asked for.
+/// Flat pieces, computed on demand.
 #[derive(Clone, Debug)]
 pub(super) struct Flats {
-    /// number of the piece of each face, as far as they are known
+    /// number of the piece of each face, if known
     of_face: Vec<u32>,
     flats: Vec<FlatPiece>,
 }
@@ -36,7 +36,7 @@ impl Flats {
         })
     }
 
-    /// That of a face.
+    /// The flat piece of a face.
     pub fn at(&mut self, facets: &Facets, face: u32) -> &FlatPiece {
         let known = self.of_face[face as usize];
         let number = if known == NONE {
@@ -68,7 +68,7 @@ impl Flats {
 }
 
 impl FlatPiece {
-    /// The faces in which it continues without an edge.
+    /// The neighbouring faces that continue it without an edge.
     pub fn beside<'a>(&'a self, facets: &'a Facets) -> impl Iterator<Item = u32> + 'a {
         let normal = facets.normal(self.faces[0]);
         let beside = self
@@ -82,14 +82,14 @@ impl FlatPiece {
     }
 }
 
-/// Whether neighbours lie in one plane as they do in a drawing, and in no measurement.
+/// Whether neighbours are coplanar as in a drawing, unlike in a measurement.
 fn is_drawn(facets: &Facets) -> bool {
     let all = facets.areas.iter().filter(|&&area| area > 0.0).count();
     let is_coplanar = |&face: &u32| {
         let is_alike = |other: u32| 1.0 - facets.normal(face).dot(&facets.normal(other)) < COPLANAR;
         facets.area(face) > 0.0 && facets.beside(face).any(|(_, other)| is_alike(other))
     };
-    // no more are looked at than it takes
+    // stops at the needed number
     let enough = (DRAWN_SHARE * all as f64) as usize + 1;
     (0..facets.slots() as u32)
         .filter(is_coplanar)

@@ -1,9 +1,9 @@
-//! Parts a mesh into planes and cylinders; cones are found beside holes, once those are known.
+//! Segmentation of a mesh into planes and cylinders; cones beside holes follow once those are
+//! known.
 //!
-//! From the flattest faces on, each free face is the seed of a region: a plane or a cylinder is
-//! fitted to the faces around it and grows over neighbours whose corners lie on it and which face
-//! as it does. Where a plane ends without an edge it may be a strip of something round: then
-//! whatever explains more of the surface is taken.
+//! From the flattest faces on, each free face is the seed of a region: a plane or a cylinder fitted
+//! to the faces around it grows over neighbours with corners on it and like normals. A plane that
+//! ends without an edge may be a strip of a round surface: then the larger region counts.
 
 use super::facets::{Facets, NONE};
 use super::flats::{FlatPiece, Flats, SMOOTH};
@@ -12,62 +12,62 @@ use super::primitive::{NormalSpread, Primitive, belongs, cylinder_of, plane_of, 
 use super::segment::{Segment, Segmentation};
 use crate::numeric::median;
 
-/// Lengths that come with the mesh.
+/// Characteristic lengths of a mesh.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct MeshScale {
-    /// of the box around all, m
+    /// diagonal of the box around all, m
     pub diagonal: f64,
     /// median length of an edge, m
     pub edge: f64,
 }
 
-/// Rounding of coordinates that were stored in single precision, in diagonals.
+/// Rounding of coordinates in single precision, in diagonals.
 pub(super) const ROUNDING: f64 = 1e-6;
-/// Surfaces off by more roundings of a file than this are off.
+/// Minimum distance of facets from their surface that counts, in roundings of a file.
 pub(super) const SEEN_FACETS: f64 = 10.0;
-/// Waves of a surface that is good otherwise, in median edges.
+/// Waves of an otherwise good surface, in median edges.
 const WAVES: f64 = 0.05;
-/// The same, at most, in diagonals of the mesh.
+/// Maximum waves, in diagonals of the mesh.
 const WAVES_OF_ALL: f64 = 3e-4;
-/// From one tolerance to the next.
+/// Ratio of successive tolerances.
 const WIDER: f64 = 3.0;
-/// How often.
+/// Number of tolerances.
 const RUNGS: i32 = 3;
-/// A corner is off by at most so many root mean squares of the faces around the seed.
+/// Maximum distance of a corner, in root mean squares of the faces around the seed.
 const SPREAD: f64 = 4.0;
-/// Largest tolerance of a round surface, in its radii.
+/// Maximum tolerance of a round surface, in its radii.
 const SHARPNESS: f64 = 0.08;
-/// So many faces determine a plane while it grows.
+/// Maximum number of faces in the fit of a plane while it grows.
 const MOST_OF_PLANE: usize = 20_000;
-/// A primitive has converged when it moves by less than this share of the tolerance …
+/// Motion of a converged primitive, as a share of the tolerance.
 const SETTLED: f64 = 0.1;
-/// … at so many faces.
+/// Number of faces in the test of convergence.
 const SAMPLE: usize = 64;
-/// A region is at least so many tolerances wide.
+/// Minimum width of a region, in tolerances.
 const LEAST_WIDTH: f64 = 12.0;
-/// A segment of which stronger ones leave less than this is dropped.
+/// Minimum share of a segment that stronger ones leave.
 const LEAST_LEFT: f64 = 0.3;
-/// Faces around a seed, to begin with.
+/// Number of faces around a seed at first.
 const NEAR: usize = 16;
 /// Root mean square of the normals' sines around a flat seed: 5°.
 const FLAT: f64 = 0.09;
-/// A flat piece that continues in round ones is so many times larger than their facets.
+/// Minimum area of a flat piece that continues in round ones, in areas of their facets.
 const FLAT_AMONG_ROUND: f64 = 20.0;
-/// … and than the flat pieces of which those may be made.
+/// Minimum area of it, in areas of neighbouring flat pieces, which may be round.
 const FLAT_BESIDE_FLAT: f64 = 5.0;
-/// The same around the seed of a cylinder, at least: 5° is what 17° of its turn have.
+/// Minimum root mean square around the seed of a cylinder: 5°, as over 17° of its turn.
 const BENT: f64 = 0.09;
-/// A region is a plane without further tests when less than this share of its border is smooth.
+/// Maximum smooth share of the border of a region that is a plane without further tests.
 const BOUNDED: f64 = 0.2;
-/// A curved surface must explain so much more than the plane in its place.
+/// Minimum area of a curved surface, in areas of the plane in its place.
 const MORE: f64 = 1.3;
-/// Faces around the seed of a curved surface, in turn.
+/// Numbers of faces around the seed of a curved surface, in turn.
 const CURVED_NEAR: [usize; 3] = [12, 32, 90];
-/// Room for as many is made at once.
+/// Initial capacity for faces around a seed.
 const USUAL_NEAR: usize = 100;
-/// Beyond a plane so many faces are examined …
+/// Maximum number of examined faces beyond a plane.
 const MOST_NEAR: usize = 50_000;
-/// … and so many of them are fitted.
+/// Maximum number of fitted faces of them.
 const MOST_FITTED: usize = 300;
 
 impl Segmentation {
@@ -100,11 +100,11 @@ struct Growing<'a> {
     /// the round in which a face was last examined
     seen: Vec<u32>,
     round: u32,
-    /// what a region from here would need, as far as that is known, m
+    /// tolerance that a region from each face needs, if known, m
     needs: Vec<f64>,
-    /// how near the faces around a seed have to be in this round, m
+    /// maximum distance of the faces around a seed in this round, m
     closeness: f64,
-    /// how near the others, m
+    /// maximum distance of the other faces, m
     tolerance: f64,
 }
 
@@ -140,10 +140,10 @@ impl<'a> Growing<'a> {
         buckets.concat()
     }
 
-    /// Free faces around `seed` that are reached over smooth edges, the nearest first.
+    /// Free faces around `seed`, connected over smooth edges, the nearest first.
     fn near(&mut self, seed: u32, most: usize) -> Vec<u32> {
         self.round += 1;
-        // of the last face all neighbours may come
+        // all neighbours of the last face may come
         let mut found = Vec::with_capacity(most.min(USUAL_NEAR) + 2);
         found.push(seed);
         self.seen[seed as usize] = self.round;
@@ -188,7 +188,7 @@ impl<'a> Growing<'a> {
             let is_more = |curved: &Segment| curved.area > enough;
             let mut curved = self.cylinder_from(seed, faces, &mut needs).filter(is_more);
             if curved.is_none() && faces > 0 && self.is_exact() {
-                // facets of a drawing that were divided further lie off the circle
+                // facets of a further divided drawing lie off the circle
                 let exact = (self.closeness, self.tolerance);
                 (self.closeness, self.tolerance) = self.scale.divided();
                 curved = self.cylinder_from(seed, faces, &mut needs).filter(is_more);
@@ -198,7 +198,7 @@ impl<'a> Growing<'a> {
         }
         match best.filter(|best| self.is_wide(best)) {
             Some(region) => self.accept(region),
-            // what was tried in vain is tried again with more tolerance
+            // a failed seed gets another trial with more tolerance
             None => {
                 let needs = needs.max(self.closeness * (1.0 + f64::EPSILON));
                 near.iter()
@@ -226,13 +226,12 @@ impl<'a> Growing<'a> {
         self.grown(seed, start, near.len())
     }
 
-    /// Whether only what a drawing has is taken in this round.
+    /// Whether this round takes exact surfaces of a drawing alone.
     fn is_exact(&self) -> bool {
         self.tolerance <= self.scale.exact()
     }
 
-    /// A flat piece of a drawing, where it continues in round ones, of facets much smaller than it
-    /// is.
+    /// A flat piece of a drawing that continues in round ones, if much larger than their facets.
     fn flat_from(&mut self, flat: &FlatPiece) -> Option<Segment> {
         let (facets, seed) = (self.facets, flat.faces[0]);
         let largest = flat
@@ -246,8 +245,8 @@ impl<'a> Growing<'a> {
         self.grown(seed, start, flat.faces.len())
     }
 
-    /// Takes the flat pieces of a drawing that are left between its round ones: what is beside may
-    /// have kept a seed from being tried.
+    /// Takes the flat pieces of a drawing that remain between its round ones: neighbours may have
+    /// kept a seed from its trial.
     fn take_flat(&mut self, seeds: &[u32], flats: &mut Flats) {
         for &seed in seeds {
             if !self.is_free(seed) {
@@ -259,7 +258,7 @@ impl<'a> Growing<'a> {
                 continue;
             }
             let flat = flat.clone();
-            // of something round that was divided further, what is beside is as large
+            // in a further divided round surface the neighbours are as large
             let is_large =
                 |face: u32| FLAT_BESIDE_FLAT * flats.at(self.facets, face).area > flat.area;
             if flat.beside(self.facets).any(is_large) {
@@ -277,7 +276,7 @@ impl<'a> Growing<'a> {
 
     /// The largest cylinder through the faces around a seed.
     ///
-    /// - `plane`: number of faces of the plane that was found there.
+    /// - `plane`: number of faces of the plane there.
     fn cylinder_from(&mut self, seed: u32, plane: usize, needs: &mut f64) -> Option<Segment> {
         let mut best: Option<Segment> = None;
         let (mut before, mut is_all) = (0, false);
@@ -323,8 +322,7 @@ impl<'a> Growing<'a> {
         best
     }
 
-    /// Whether corners of `near` are as near as the tolerance wants them; else returns what they
-    /// need.
+    /// Whether the corners of `near` are within the tolerance; else lowers `needs` to their need.
     fn is_close(&self, primitive: &Primitive, near: &[u32], needs: &mut f64) -> bool {
         let squares = near
             .iter()
@@ -337,7 +335,7 @@ impl<'a> Growing<'a> {
 
     /// The region around `seed` that a primitive explains, and the primitive through all of it.
     ///
-    /// - `near`: from how many faces around the primitive comes.
+    /// - `near`: number of faces around the seed behind the primitive.
     fn grown(&mut self, seed: u32, start: Primitive, near: usize) -> Option<Segment> {
         let mut primitive = start;
         let mut faces = Vec::new();
@@ -368,11 +366,11 @@ impl<'a> Growing<'a> {
         })
     }
 
-    /// Goes from the faces of `found` over all that belong to the primitive, which follows them
-    /// each time their number has doubled.
+    /// Grows from the faces of `found` over all that belong to the primitive, with a new fit each
+    /// time their number has doubled.
     ///
-    /// - `fitted`: how many faces already determine the primitive; fewer of them may be flat by
-    ///   themselves.
+    /// - `fitted`: number of faces that already determine the primitive; fewer of them may be flat
+    ///   by themselves.
     fn flood(&mut self, mut found: Vec<u32>, primitive: &mut Primitive, fitted: usize) -> Vec<u32> {
         self.round += 1;
         found
@@ -451,7 +449,7 @@ impl<'a> Growing<'a> {
         smooth / all
     }
 
-    /// Parts the mesh once more: tight and large segments take what they explain of loose and small
+    /// Parts the mesh once more: tight and large segments take over their faces in loose and small
     /// ones.
     fn claim(&mut self) {
         let mut order = std::mem::take(&mut self.segments);
@@ -516,7 +514,7 @@ impl<'a> Growing<'a> {
     }
 }
 
-/// The largest power of two, as its exponent, that is not above `x`, from 1 on.
+/// Exponent of the largest power of two up to `x`, from 1 on.
 fn power_of_two(x: f64) -> usize {
     (x.to_bits() >> (f64::MANTISSA_DIGITS - 1)) as usize - (f64::MAX_EXP - 1) as usize
 }
@@ -537,10 +535,10 @@ impl MeshScale {
         }
     }
 
-    /// How near the faces around a seed have to be, and how near the others. Tight ones first: what
-    /// they explain is not left to loose ones.
+    /// Maximum distances of the faces around a seed, and of the other faces. Tight ones first:
+    /// loose ones must not take their faces.
     ///
-    /// - `is_drawn`: whether neighbours lie in one plane as they do in a drawing.
+    /// - `is_drawn`: whether neighbours are coplanar as in a drawing.
     fn tolerances(&self, is_drawn: bool) -> Vec<(f64, f64)> {
         let (exact, (closeness, tolerance)) = (self.exact(), self.waves());
         let wider = |rung| f64::powi(WIDER, rung);
@@ -552,23 +550,22 @@ impl MeshScale {
             .collect()
     }
 
-    /// What a drawing needs, m.
+    /// Tolerance of a drawing, m.
     fn exact(&self) -> f64 {
         ROUNDING * self.diagonal
     }
 
-    /// How far facets of a drawing are off a round surface where they have corners on its chords,
-    /// m.
+    /// Distance of a drawing's facets from a round surface with corners on its chords, m.
     pub(super) fn chords(&self) -> f64 {
         WAVES_OF_ALL * self.diagonal
     }
 
-    /// What the facets of a drawing need that were divided further.
+    /// Tolerances of a further divided drawing.
     fn divided(&self) -> (f64, f64) {
         (self.chords(), WIDER * self.chords())
     }
 
-    /// What surfaces that are good but no drawing need.
+    /// Tolerances of good surfaces off a drawing.
     fn waves(&self) -> (f64, f64) {
         let closeness = (WAVES * self.edge)
             .min(WAVES_OF_ALL * self.diagonal)

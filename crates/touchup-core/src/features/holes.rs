@@ -1,4 +1,4 @@
-//! Round holes and bosses: round walls that have nothing, or material, inside.
+//! Round holes and bosses: round walls with air, or material, inside.
 
 use nalgebra::{Point3, Vector3};
 
@@ -13,21 +13,21 @@ use crate::numeric::{median, tangent_basis};
 pub(super) struct Hole {
     /// number of its wall
     pub wall: usize,
-    /// where the axis leaves through the opening, m, in O
+    /// point of the axis in the opening, m, in O
     pub opening: Point3<f64>,
     /// unit vector out of the opening
     pub out: Vector3<f64>,
     /// m
     pub depth: f64,
-    /// `None`: what closes it is neither a floor nor the tip of a drill, or the mesh ends there
+    /// `None`: closed by neither a floor nor the tip of a drill, or the mesh ends there
     pub through: Option<bool>,
     /// number of the plane, or of the cylinder with the material inside, around the opening
     pub rim: Option<usize>,
-    /// whether it is open to the side along all of its wall: a cut at the rim of the part
+    /// whether its wall is open to the side over its length: a cut at the rim of the part
     pub is_notch: bool,
-    /// number of the plane that is its floor
+    /// number of the plane of its floor
     pub floor: Option<usize>,
-    /// number of the wall that is its countersink
+    /// number of the wall of its countersink
     pub countersink: Option<usize>,
 }
 
@@ -48,58 +48,57 @@ pub(super) struct Boss {
     pub is_turned: bool,
 }
 
-/// A wall around a hole covers at least this share of a turn: a hole with a keyway or a slit still
-/// counts.
+/// Minimum share of a turn of a hole's wall: a hole with a keyway or a slit still counts.
 const HOLE_COVERAGE: f64 = 0.56;
-/// That of a boss.
+/// Minimum share of a turn of a boss.
 const BOSS_COVERAGE: f64 = 0.75;
-/// A shaft goes around its shoulder by at least this share of what stands on it.
+/// Minimum coverage of a shaft below a shoulder, as a share of the coverage of the wall above.
 const SHAFT_COVERAGE: f64 = 0.8;
-/// Faces cover at least this share of what a wall is between its ends.
+/// Minimum share of a wall between its ends that faces cover.
 const FILLED: f64 = 0.4;
-/// A wall is a fragment of another when it is so much smaller …
+/// Maximum area of a fragment of another wall, as a share of that.
 const SMALLER: f64 = 0.5;
-/// … place and radius agree within this share of the radius …
+/// Tolerance of its position and radius, as a share of the radius.
 const REST: f64 = 0.3;
-/// … and its axis is off by more than 6°, or its radius by nothing.
+/// Minimum tilt of its axis, 6° as a cosine, unless its radius is the same.
 const STRAIGHT: f64 = 0.9945;
-/// Least height of a wall, in radii: a rim rounded by noise is lower.
+/// Minimum height of a wall, in radii: a rim rounded by noise is lower.
 const LEAST_HEIGHT: f64 = 0.08;
-/// So much of the radius around the axis is free in a hole, and so much beyond the wall a line to
-/// it goes.
+/// Minimum free share of the radius around the axis in a hole; a line to the wall ends at the same
+/// share beyond it.
 const FREE: f64 = 0.5;
-/// Points of the axis from which lines to the wall are examined, and lines from each.
+/// Number of points on the axis with lines to the wall, and of lines from each.
 const PROBES: usize = 5;
 const PROBE_RAYS: usize = 8;
-/// What closes a hole is no farther from the end of its wall than this many radii.
+/// Maximum distance of a hole's closure from the end of its wall, in radii.
 const CLOSED: f64 = 1.0;
-/// Where no plane is around an end and something is met within this many radii, the wall may go on
-/// to there unseen.
+/// Distance within which a hit makes an end without a plane around it uncertain, in radii: the wall
+/// may continue unseen.
 const MAYBE_CLOSED: f64 = 3.0;
-/// Rays that search for what closes a hole start this share of the radius beside its axis.
+/// Offset of the rays for the closure of a hole from its axis, as a share of the radius.
 const ASIDE: f64 = 0.05;
 /// Rings around an opening, in its radii: the land beside a hole may be narrow.
 const RINGS: [f64; 3] = [1.06, 1.15, 1.3];
-/// Those around a foot that was scanned or touched: a ball does not reach into its corner.
+/// Rings around a scanned or touched foot: a ball does not reach into its corner.
 const FOOT_RINGS: [f64; 4] = [1.2, 1.35, 1.5, 1.8];
-/// A plane around an opening is within this many radii of the end of the wall.
+/// Maximum distance of a plane around an opening from the end of the wall, in radii.
 const NEAR_END: f64 = 0.4;
-/// Share of the rings that a plane has to have.
+/// Minimum share of the rings on a plane.
 const RIM: f64 = 0.2;
 /// A floor is square to the axis within 20°.
 const SQUARE: f64 = 0.94;
-/// An end is torn by borders of the mesh from so many radii before it to so many behind it, and as
-/// far around it.
+/// Range of mesh borders that tear an end, before and behind it, in radii; also their maximum
+/// distance from the axis.
 const TORN: [f64; 2] = [0.5, 1.5];
-/// Directions in which an end is examined.
+/// Number of directions that examine an end.
 const AROUND: usize = 24;
-/// A notch is open over so many of these directions: 45° …
+/// Minimum number of open directions of a notch: 45°.
 const NOTCH: usize = 3;
-/// … as far as this many radii from the axis.
+/// Length of an open direction, in radii from the axis.
 const OPEN: f64 = 3.0;
-/// Walls of one hole are no farther apart along the axis than this many radii.
+/// Maximum gap between walls of one hole along the axis, in radii.
 const SAME_HOLE: f64 = 0.5;
-/// Axes of one stepped hole are no farther apart than this share of the radius.
+/// Maximum distance of the axes of one stepped hole, as a share of the radius.
 const SAME_AXIS: f64 = 0.15;
 /// Heads of countersunk screws are 1.8 to 2 times as wide as their holes, broken edges seldom more
 /// than 1.1 times.
@@ -112,11 +111,11 @@ struct WallEnd {
     t: f64,
     /// out of the hole, ±1 times the axis
     out: f64,
-    /// what closes it, along the axis, m
+    /// position of its closure, along the axis, m
     closed_at: Option<f64>,
-    /// whether nothing closes it, or may do so farther away
+    /// whether it has no closure; `false` also if a farther one is possible
     is_open: bool,
-    /// what is around it and its share of the ring
+    /// land around it and its share of the ring
     rim: Option<(usize, f64)>,
 }
 
@@ -165,8 +164,8 @@ fn is_fragment_of(parted: &Parted, wall: &Wall, better: &Wall) -> bool {
 fn hole(parted: &Parted, walls: &[Wall], at: usize) -> Option<Hole> {
     let wall = &walls[at];
     let radius = wall.radius();
-    // a ball that went around a wall was inside of it: what the mesh has there is a plug that
-    // nobody felt, and what it has not a gap
+    // a ball that went around a wall was inside of it: mesh there is an untouched plug, and missing
+    // mesh a gap
     let is_felt = wall.felt_turn > 0.0;
     let is_whole = wall.coverage >= HOLE_COVERAGE && (is_felt || wall.filled >= FILLED);
     if !is_whole || wall.height() < LEAST_HEIGHT * radius || !is_felt && !is_free(parted, wall) {
@@ -228,7 +227,7 @@ fn hole(parted: &Parted, walls: &[Wall], at: usize) -> Option<Hole> {
     })
 }
 
-/// The plane at which a hole gets narrower, where another goes on behind it.
+/// The plane at which a hole narrows, if another hole continues behind it.
 fn shoulder(parted: &Parted, walls: &[Wall], at: usize, end: &WallEnd) -> Option<usize> {
     let wall = &walls[at];
     let is_next = |next: &&Wall| {
@@ -250,8 +249,8 @@ fn shoulder(parted: &Parted, walls: &[Wall], at: usize, end: &WallEnd) -> Option
         .map(|(number, _)| number)
 }
 
-/// Whether a wall is a cut at the rim of the part: beside where it is open neither a wall nor what
-/// is around the opening goes on.
+/// Whether a wall is a cut at the rim of the part: beside its open side neither a wall nor the land
+/// around the opening continues.
 fn is_notch(parted: &Parted, wall: &Wall, end: &WallEnd) -> bool {
     let (radius, around) = (wall.radius(), parted.around(wall.segments[0]));
     let [e, g] = tangent_basis(&wall.axis);
@@ -283,8 +282,8 @@ fn is_notch(parted: &Parted, wall: &Wall, end: &WallEnd) -> bool {
     widest(0) > 0 && widest(1) >= NOTCH
 }
 
-/// Whether most lines from the axis to the wall meet nothing on the way. What closes the hole,
-/// however shallow it is, is not asked.
+/// Whether most lines from the axis to the wall are free. The closure of the hole, however shallow,
+/// does not matter.
 fn is_free(parted: &Parted, wall: &Wall) -> bool {
     let radius = wall.radius();
     let [e, g] = tangent_basis(&wall.axis);
@@ -297,14 +296,14 @@ fn is_free(parted: &Parted, wall: &Wall) -> bool {
                 (std::f64::consts::TAU * (k as f64 + 0.3) / PROBE_RAYS as f64).sin_cos();
             let along = e * cosine + g * sine;
             let met = rays.first(&start, &along, (1.0 + FREE) * radius);
-            // what is met from behind is material around the axis
+            // a hit from behind is material around the axis
             let is_free = |met: RayHit| {
                 met.distance > FREE * radius && parted.facets.normal(met.face.0).dot(&along) < 0.0
             };
             free += usize::from(met.is_none_or(is_free));
         }
     }
-    // a lid that the scanner saw, or a chip, may close a part of it
+    // a scanned lid, or a chip, may close a part of it
     2 * free >= PROBES * PROBE_RAYS
 }
 
@@ -323,8 +322,8 @@ fn end(parted: &Parted, wall: &Wall, which: usize) -> WallEnd {
     );
     let rim = rim.filter(|&(_, share)| share > RIM);
     let reach = [CLOSED, MAYBE_CLOSED].map(|radii| wall.height() / 2.0 + radii * radius);
-    // beside the axis: on it lie the tips of cones and the edges of floors, which a line may slip
-    // through
+    // beside the axis: on it lie the tips of cones and the edges of floors, through which a line
+    // may slip
     let [e, g] = tangent_basis(&wall.axis);
     let mut rays = around.rays(radius);
     let mut met = [0.4f64, 2.5, 4.6].map(|turn| {
@@ -344,8 +343,8 @@ fn end(parted: &Parted, wall: &Wall, which: usize) -> WallEnd {
     }
 }
 
-/// Whether the mesh ends there: the continuation of the wall was neither scanned nor touched. Where
-/// a plane is around the end, the border has to be as long as half of the turn.
+/// Whether the mesh ends there: the continuation of the wall is neither scanned nor touched. With a
+/// plane around the end, the border must be as long as half of the turn.
 fn is_torn(parted: &Parted, wall: &Wall, end: &WallEnd) -> bool {
     let (middle, [e, g]) = (wall.at(end.t), tangent_basis(&wall.axis));
     let near = TORN.map(|radii| radii * wall.radius());
@@ -374,7 +373,7 @@ fn is_torn(parted: &Parted, wall: &Wall, end: &WallEnd) -> bool {
     2 * torn >= if end.rim.is_some() { AROUND } else { 1 }
 }
 
-/// How much of an opening an end is, beside the other end.
+/// Score of an end as the opening, against the other end.
 fn openness(walls: &[Wall], at: usize, end: &WallEnd) -> f64 {
     let wall = &walls[at];
     let is_near = |other: &Wall| other.gap(wall) < SAME_HOLE * wall.radius();
@@ -396,8 +395,8 @@ fn cone_beside(walls: &[Wall], at: usize, end: &WallEnd) -> Option<usize> {
     walls.iter().position(|cone| is_next(cone) && is_near(cone))
 }
 
-/// Whether a cone at the opening of a hole is wide enough for the head of a screw, not the edge of
-/// the hole broken.
+/// Whether a cone at the opening of a hole is wide enough for the head of a screw, not a broken
+/// edge.
 fn is_countersink(cone: &Wall, wall: &Wall, out: f64) -> bool {
     cone.axis.dot(&wall.axis) * out > 0.0 && cone.radius_at(cone.ends[1]) > HEAD * wall.radius()
 }
@@ -412,7 +411,7 @@ fn floor_at(parted: &Parted, wall: &Wall, t: f64) -> Option<usize> {
     (parted.plane(number)?.normal().dot(&wall.axis).abs() > SQUARE).then_some(number)
 }
 
-/// Holes that follow each other on one axis: the group of each, where it has company.
+/// Groups of holes that follow each other on one axis: the group of each, `None` for a single hole.
 pub(super) fn groups(walls: &[Wall], holes: &[Hole]) -> Vec<Option<u32>> {
     let mut group = vec![None; holes.len()];
     for i in 0..holes.len() {
@@ -427,7 +426,7 @@ pub(super) fn groups(walls: &[Wall], holes: &[Hole]) -> Vec<Option<u32>> {
     group
 }
 
-/// All round bosses, and steps of shafts: walls with material inside whose foot is a plane.
+/// All round bosses, and steps of shafts: walls with material inside on a plane as foot.
 pub(super) fn bosses(parted: &Parted, walls: &[Wall]) -> Vec<Boss> {
     let is_boss =
         |wall: &Wall| !wall.is_concave && !wall.is_cone() && wall.coverage >= BOSS_COVERAGE;
@@ -437,8 +436,8 @@ pub(super) fn bosses(parted: &Parted, walls: &[Wall]) -> Vec<Boss> {
         .collect()
 }
 
-/// Whether a wall is what carries the shoulder on which another stands at `foot`, `out` being ±1
-/// times its axis.
+/// Whether a wall carries the shoulder of another wall, which stands on it at `foot`, `out` being
+/// ±1 times its axis.
 fn is_shaft_below(wider: &Wall, wall: &Wall, foot: f64, out: f64) -> bool {
     let is_round = !wider.is_concave && wider.coverage >= SHAFT_COVERAGE * wall.coverage;
     let is_round = is_round && wider.radius() > wall.radius();
@@ -449,8 +448,8 @@ fn is_shaft_below(wider: &Wall, wall: &Wall, foot: f64, out: f64) -> bool {
         && wider.gap(wall) < SAME_HOLE * wall.radius()
 }
 
-/// Whether the part is round about the axis of a wall below the shoulder at `foot` that it stands
-/// on, whatever of that was segmented: a shaft that was scanned badly, and touched in strips.
+/// Whether the part is round about the axis of a wall below its shoulder at `foot`, whatever the
+/// segmentation there: a badly scanned shaft, touched in strips.
 fn is_round_below(parted: &Parted, wall: &Wall, foot: f64, out: f64) -> bool {
     let (radius, axis, middle) = (wall.radius(), wall.axis, wall.at(foot));
     let reach = Vector3::repeat(BELOW_RADII[1] * radius);
@@ -482,9 +481,9 @@ fn is_round_below(parted: &Parted, wall: &Wall, foot: f64, out: f64) -> bool {
     of_parts.len() as f64 >= BELOW_SHARE * BELOW_PARTS as f64
 }
 
-/// Below a shoulder a part is round when in this share of so many parts of a turn there are faces
-/// this far below it and this far from the axis, all in radii of what stands on it, whose normals
-/// are radial within 20°, all as far from the axis within this share.
+/// A part is round below a shoulder if a minimum share of the parts of a turn has faces in a range
+/// below it and a range from the axis, both in radii of the wall above, with normals radial within
+/// 20° and distances from the axis alike within a share.
 const BELOW_PARTS: usize = 24;
 const BELOW_SHARE: f64 = 0.75;
 const BELOW: std::ops::Range<f64> = 0.1..1.0;

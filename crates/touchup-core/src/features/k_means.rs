@@ -6,7 +6,7 @@ use rand_pcg::Pcg64;
 
 /// Draws for each centre at the start: 2 + ln k for the few clusters of a part.
 const DRAWS: usize = 4;
-/// Rounds at most; points of a mesh converge in tens.
+/// Maximum number of rounds; points of a mesh converge in tens.
 const MOST_ROUNDS: usize = 300;
 
 /// Centres and the points that belong to them.
@@ -14,7 +14,7 @@ const MOST_ROUNDS: usize = 300;
 pub struct KMeans {
     /// Means of their points, m.
     pub centers: Vec<Point3<f64>>,
-    /// For each point the index of its nearest centre; empty where `k` is 0.
+    /// For each point the index of its nearest centre; empty for `k` = 0.
     pub labels: Vec<u32>,
 }
 
@@ -22,8 +22,8 @@ pub struct KMeans {
 /// Vassilvitskii 2007\].
 ///
 /// Ends when no point changes its group: at a least sum of squares among near partitions, not among
-/// all. Returns fewer groups where fewer than `k` points are distinct. Own code: the kept crates
-/// for it bring threads and arrays of their own.
+/// all. Returns fewer groups for fewer than `k` distinct points. Own code: the kept crates for it
+/// bring threads and arrays of their own.
 pub fn k_means(points: &[Point3<f64>], k: usize, seed: u64) -> KMeans {
     let mut centers = seeds(points, k, seed);
     let mut labels = vec![u32::MAX; if centers.is_empty() { 0 } else { points.len() }];
@@ -63,8 +63,8 @@ fn nearest(p: &Point3<f64>, centers: &[Point3<f64>]) -> u32 {
     best
 }
 
-/// The first at random; then each time the best of a few that are drawn with a chance as the square
-/// of their distance from those before: the one that leaves the least sum of squares. One draw
+/// The first at random; then each time the best of a few draws with a chance as the square of their
+/// distance from the previous ones: the draw with the least remaining sum of squares. One draw
 /// alone often puts two into one group.
 fn seeds(points: &[Point3<f64>], k: usize, seed: u64) -> Vec<Point3<f64>> {
     if points.is_empty() || k == 0 {
@@ -105,8 +105,7 @@ fn seeds(points: &[Point3<f64>], k: usize, seed: u64) -> Vec<Point3<f64>> {
     centers
 }
 
-/// The place at which the running sum passes `rest`, or the last one that adds to it; `None` where
-/// none does.
+/// The place at which the running sum passes `rest`, or the last positive one; `None`: all are 0.
 fn drawn(squares: &[f64], mut rest: f64) -> Option<usize> {
     let passes = |square: &f64| {
         rest -= square;

@@ -1,4 +1,4 @@
-//! Which of many faces, or vertices, are meant: one bit for each.
+//! Sets of faces, or vertices: one bit for each.
 
 /// Numbers below a limit, each once.
 pub(super) struct NumberSet(Vec<u64>);
@@ -24,10 +24,10 @@ impl NumberSet {
     }
 }
 
-/// Fewer of a limit than this share are sorted one by one.
+/// Fewer numbers than the limit divided by this are sorted one by one.
 const FEW: usize = 64;
 
-/// Sorts numbers below `limit` of which there is none twice.
+/// Sorts distinct numbers below `limit`.
 pub(super) fn sort(numbers: &mut Vec<u32>, limit: usize) {
     if numbers.len() < limit / FEW {
         return numbers.sort_unstable();

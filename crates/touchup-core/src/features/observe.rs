@@ -24,39 +24,39 @@ pub(super) struct Observed<'a> {
     group: Vec<u32>,
     /// numbers of the touches by place
     grid: PointGrid,
-    /// a place is touched when a touch is within this, m
+    /// maximum distance from a touch to a touched place, m
     reach: f64,
 }
 
-/// Touches of one stroke within this time share their error: the window in which they are smoothed,
-/// and half of it again.
+/// Touches of one stroke within this time share their error: the smoothing window, and half of it
+/// again.
 const SHARED_NS: i64 = 100_000_000;
-/// Share of what the touches of one plane have in common that those of another have not: poses
+/// Share of the common errors of touches on one plane that those of another do not have: poses
 /// wander slowly, and the stylus leans otherwise.
 pub(super) const NOT_ALIKE: f64 = 0.33;
-/// A touch is of a segment when it is off it by no more than so many tolerances …
+/// Maximum distance of a touch from its segment, in tolerances.
 const NEAR_TOLERANCES: f64 = 3.0;
-/// … or this share of the radius of the ball: what the scan and the noise leave.
+/// The same, as a share of the radius of the ball: for errors of the scan and noise.
 const NEAR_RADII: f64 = 0.15;
-/// Its normal is no farther off than this: 40°, friction and edges.
+/// Cosine of the tolerance of its normal: 40°, friction and edges.
 const ALIKE: f64 = 0.77;
-/// Where the tip is no ball a place is touched within this, m.
+/// Maximum distance of a touched place for a tip without a ball, m.
 const REACH: f64 = 1e-3;
-/// Least standard deviation, m: where none is stated it is estimated from the residuals.
+/// Minimum standard deviation, m: unstated ones follow from the residuals.
 const LEAST_SIGMA: f64 = 1e-6;
-/// A touch counts at least this much.
+/// Minimum weight of a touch.
 const LEAST_WEIGHT: f64 = 0.01;
-/// Vertices of which a surface is fitted, at most.
+/// Maximum number of vertices in a fit.
 const MOST_VERTICES: usize = 1500;
-/// Fewer vertices than this are not picked out.
+/// Minimum number of selected vertices; with fewer, all count.
 const LEAST_ON: usize = 8;
-/// Faces around a vertex, at most, where it is tested for lying on a chord.
+/// Maximum number of faces around a vertex for the chord test.
 const MOST_AROUND: usize = 32;
-/// A line is along the straight lines of a round surface when it is within 25° of them.
+/// Cosine of the tolerance between a line and the straight lines of a round surface: 25°.
 const STRAIGHT: f64 = 0.9;
-/// Faces that are tested for touches, at most.
+/// Maximum number of faces that are tested for touches.
 const MOST_FACES: usize = 400;
-/// Of a measured mesh the vertices within this many edges share their error.
+/// Vertices of a measured mesh within this number of edges share their error.
 const SHARED_EDGES: f64 = 3.0;
 
 impl<'a> Observed<'a> {
@@ -114,7 +114,7 @@ impl<'a> Observed<'a> {
 
     /// Numbers of the touches on a surface, in ascending order.
     ///
-    /// - `is_of`: whether a point of the surface is of the part that is meant.
+    /// - `is_of`: whether a point of the surface is in the relevant part.
     pub fn touches_on(
         &self,
         surface: &impl Surface,
@@ -139,25 +139,25 @@ impl<'a> Observed<'a> {
         numbers.iter().map(observation).collect()
     }
 
-    /// What all touches have in common along their normals, and by how much they are displaced
-    /// together, m: standard deviations of what does not average out.
+    /// Standard deviations that do not average out, m: common error of all touches along their
+    /// normals, and their common displacement.
     pub fn systematic(&self, numbers: &[u32]) -> [f64; 2] {
         systematic(numbers.iter().map(|&number| &self.touches[number as usize]))
     }
 
-    /// Whether the part was touched anywhere.
+    /// Whether the part has any touch.
     pub fn has_touches(&self) -> bool {
         !self.touches.is_empty()
     }
 
-    /// The touches that are no outliers, with their numbers.
+    /// The touches except outliers, with their numbers.
     pub fn sound(&self) -> impl Iterator<Item = (u32, &ProbedPoint)> {
         (0..)
             .zip(self.touches)
             .filter(|(_, touch)| !touch.is_rejected)
     }
 
-    /// A place is touched when a touch is within this, m: the radius of the ball.
+    /// Maximum distance from a touch to a touched place, m: the radius of the ball.
     pub fn reach(&self) -> f64 {
         self.reach
     }
@@ -172,7 +172,7 @@ impl<'a> Observed<'a> {
         let vertices = self.vertices_of(segments);
         let step = vertices.len().div_ceil(MOST_VERTICES).max(1);
         let segment = self.parted.segment(segments[0]);
-        // in a drawing the residuals show what exceeds rounding
+        // in a drawing the residuals show errors above rounding
         let sigma = self.parted.rounding.unwrap_or(segment.tolerance) / 6.0;
         let cell = SHARED_EDGES * self.parted.edge;
         let mut cells: BTreeMap<VoxelKey, u32> = BTreeMap::new();
@@ -195,8 +195,8 @@ impl<'a> Observed<'a> {
             .collect()
     }
 
-    /// How far the faces of a measured mesh are off a surface of such a radius, m; 0 in a drawing,
-    /// which has their corners on it.
+    /// Distance of a measured mesh's faces from a surface of a radius, m; 0 in a drawing, with
+    /// corners on it.
     pub fn sagitta(&self, radius: f64) -> f64 {
         match self.parted.rounding {
             Some(_) => 0.0,
@@ -204,8 +204,8 @@ impl<'a> Observed<'a> {
         }
     }
 
-    /// Observations of a segment for a fit: its vertices, or points all over it where it is flat in
-    /// a drawing, whose few corners may all lie at its ends.
+    /// Observations of a segment for a fit: its vertices, or points all over it if it is flat in a
+    /// drawing, as its few corners may all lie at its ends.
     pub fn of_mesh_surface(&self, number: usize) -> Vec<Observation> {
         match self
             .parted
@@ -226,8 +226,7 @@ impl<'a> Observed<'a> {
     }
 
     /// The vertices of some segments, in ascending order; of round ones in a drawing without those
-    /// on chords: a tessellation has them where a neighbour needed a corner, and they are not on
-    /// the surface.
+    /// on chords: a tessellation puts corners of neighbours there, off the surface.
     fn vertices_of(&self, segments: &[usize]) -> Vec<VertexId> {
         let Parted {
             facets,
@@ -260,7 +259,7 @@ impl<'a> Observed<'a> {
         if on.len() < LEAST_ON { vertices } else { on }
     }
 
-    /// Share of the area of some segments that was touched.
+    /// Touched share of the area of some segments.
     pub fn touched_share(&self, segments: &[usize]) -> f64 {
         if self.touches.is_empty() {
             return 0.0;
@@ -283,14 +282,14 @@ impl<'a> Observed<'a> {
         touched / all
     }
 
-    /// Share of a line between two places that was touched.
+    /// Touched share of a line between two places.
     pub fn touched_along(&self, [from, to]: &[Point3<f64>; 2]) -> f64 {
         let count = (((to - from).norm() / self.reach).ceil() as usize).clamp(1, MOST_FACES);
         let at = |i: usize| from + (to - from) * ((i as f64 + 0.5) / count as f64);
         (0..count).filter(|&i| self.is_touched(&at(i))).count() as f64 / count as f64
     }
 
-    /// Share of some places that was touched.
+    /// Touched share of some places.
     pub fn touched_at(&self, places: &[Point3<f64>]) -> f64 {
         places.iter().filter(|p| self.is_touched(p)).count() as f64 / places.len().max(1) as f64
     }
@@ -329,8 +328,8 @@ pub(super) fn systematic<'a>(touches: impl Iterator<Item = &'a ProbedPoint>) -> 
     sum.map(|sum| sum / count.max(1.0))
 }
 
-/// Whether a vertex is between two others of its faces on a line that is not one of the straight
-/// lines of the surface.
+/// Whether a vertex is between two others of its faces on a line other than the straight lines of
+/// the surface.
 fn is_on_chord(
     mesh: &TriMesh,
     vertex: VertexId,

@@ -1,5 +1,5 @@
-//! The surfaces that machined parts are made of, and how each is found from faces: by their normals
-//! first, then by least squares over their corners.
+//! Surfaces of machined parts, and their fits to faces: by normals first, then by least squares
+//! over corners.
 
 use nalgebra::{Matrix2, Matrix3, Point3, SVector, Vector2, Vector3};
 
@@ -13,9 +13,9 @@ use crate::numeric::{NormalEquations, tangent_basis};
 pub(crate) enum Primitive {
     /// flat
     Plane(Plane),
-    /// as wide everywhere
+    /// constant radius
     Cylinder(Cylinder),
-    /// wider along its axis
+    /// radius growing along its axis
     Cone(Cone),
 }
 
@@ -40,7 +40,7 @@ impl Primitive {
         }
     }
 
-    /// The plane, if it is one.
+    /// The plane, if flat.
     #[inline]
     pub fn plane(&self) -> Option<&Plane> {
         if let Self::Plane(plane) = self {
@@ -51,13 +51,13 @@ impl Primitive {
     }
 }
 
-/// A face's normal may be off that of the primitive by this much: 25°.
+/// Cosine of the tolerance between the normals of a face and its primitive: 25°.
 pub(super) const FACES_ALIKE: f64 = 0.906;
 
-/// Whether a face lies on the primitive within `tolerance` (m) and faces as it does.
+/// Whether a face lies on the primitive within `tolerance` (m), with a like normal.
 pub(super) fn belongs(facets: &Facets, face: u32, primitive: &Primitive, tolerance: f64) -> bool {
     let normal = match primitive {
-        // most are planes: no more is loaded and reckoned than they need
+        // most are planes: loads and computes no more than they need
         Primitive::Plane(plane) => {
             let (point, normal) = (plane.point(), plane.normal());
             let off = |vertex: VertexId| (facets.mesh.position(vertex) - point).dot(&normal).abs();
@@ -73,7 +73,7 @@ pub(super) fn belongs(facets: &Facets, face: u32, primitive: &Primitive, toleran
     };
     normal.is_some_and(|normal| {
         facets.normal(face).dot(&normal) > FACES_ALIKE || {
-            // the normal of a sliver says nothing
+            // the normal of a sliver is meaningless
             let corners = facets.triangle(face);
             let longest = (0..3)
                 .map(|i| (corners[i] - corners[(i + 1) % 3]).norm())
@@ -83,8 +83,8 @@ pub(super) fn belongs(facets: &Facets, face: u32, primitive: &Primitive, toleran
     })
 }
 
-/// The normal of a surface beneath the middle of a face, in O; `None` where a corner is farther
-/// from it than `tolerance`, m.
+/// The normal of a surface beneath the middle of a face, in O; `None`: a corner is farther from it
+/// than `tolerance`, m.
 fn normal_beneath(
     facets: &Facets,
     face: u32,
@@ -192,8 +192,7 @@ impl NormalSpread {
         Some(Self { spread, second })
     }
 
-    /// Axis of the cylinder whose normals these could be: the direction along which there is least
-    /// of them.
+    /// Axis of a cylinder with these normals: the direction of their least second moment.
     pub fn cylinder_axis(&self) -> Option<Vector3<f64>> {
         let eigen = self.second.symmetric_eigen();
         let mut pairs = [0, 1, 2].map(|i| {
@@ -207,15 +206,15 @@ impl NormalSpread {
     }
 }
 
-/// Rounding may leave less than nothing.
+/// Root of a number that rounding may make negative.
 fn root(x: f64) -> f64 {
     x.max(0.0).sqrt()
 }
 
-/// The direction without normals is clear when they differ so much more in the next.
+/// Maximum ratio of the normals' spread along a clear axis to the next one.
 const CLEAR: f64 = 0.5;
 
-/// The cylinder with this axis whose normals these are: the lines along them meet at its axis.
+/// The cylinder about this axis from normals: the lines along them meet at its axis.
 pub(super) fn cylinder_of(
     facets: &Facets,
     faces: &[u32],
@@ -254,19 +253,20 @@ pub(super) fn cylinder_of(
     )))
 }
 
-/// Rounds of least squares.
+/// Number of rounds of least squares.
 const ROUNDS: usize = 6;
-/// A step below this share of the radius ends them.
+/// Step that ends the rounds, as a share of the radius.
 const REST: f64 = 1e-7;
-/// How much a normal counts beside a corner: as an arm of this share of the radius.
+/// Weight of a normal beside a corner: as an arm of this share of the radius.
 const NORMAL_ARM: f64 = 0.2;
-/// Of fewer faces of a cylinder all corners count, of more one each: neighbours share theirs.
+/// Number of a cylinder's faces from which one corner each counts, not all: neighbours share
+/// theirs.
 const FEW: usize = 40;
-/// So many faces are enough while a region grows.
+/// Maximum number of faces in a fit while a region grows.
 const MOST_ROWS: usize = 500;
 
-/// The curved surface moved to the least squares over the corners of the faces, and of a cylinder
-/// over their normals; planes stay as they are.
+/// The curved surface fitted by least squares to the corners of the faces, and a cylinder also to
+/// their normals; planes stay the same.
 pub(super) fn refined(primitive: &Primitive, facets: &Facets, faces: &[u32]) -> Option<Primitive> {
     match primitive {
         _ if faces.is_empty() => None,
@@ -283,7 +283,7 @@ pub(super) fn refined(primitive: &Primitive, facets: &Facets, faces: &[u32]) -> 
     }
 }
 
-/// By least squares over the N freedoms that the surface has.
+/// Least squares over the N freedoms of the surface.
 ///
 /// - `are_square`: whether the normals of the surface are square to its axis; then those of the
 ///   faces count.
@@ -295,7 +295,7 @@ fn moved_to<S: Surface, const N: usize>(
     are_square: bool,
 ) -> Option<S> {
     let free = const { numbers_of_free::<N>(S::FREE) };
-    // it turns about the middle of the faces
+    // the surface turns about the middle of the faces
     let own = start.to_own();
     let places: Vec<_> = faces
         .iter()
@@ -340,7 +340,7 @@ fn moved_to<S: Surface, const N: usize>(
     Some(surface)
 }
 
-/// Which of the freedoms a surface has, by their numbers.
+/// Numbers of the freedoms of a surface.
 const fn numbers_of_free<const N: usize>(has: [bool; FREEDOMS]) -> [usize; N] {
     let (mut numbers, mut count, mut freedom) = ([0; N], 0, 0);
     while freedom < FREEDOMS {

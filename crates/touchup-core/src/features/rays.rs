@@ -1,11 +1,10 @@
-//! Where a straight line first meets the mesh.
+//! First intersection of a straight line with the mesh.
 
 use nalgebra::{Point3, Vector3};
 
 use crate::mesh::{BoxQuery, FaceId, FaceTree, TriMesh};
 
-/// A line is followed in so many pieces at most: a void may be narrower than any number of pieces
-/// can be.
+/// Maximum number of pieces of a line: a void may be narrower than any number of pieces can be.
 const MOST_PIECES: f64 = 1000.0;
 
 /// Rounding of barycentric coordinates: a line through an edge slips through between its triangles
@@ -16,10 +15,9 @@ const ON_EDGE: f64 = 1e-9;
 pub(super) struct Rays<'a> {
     mesh: &'a TriMesh,
     tree: &'a FaceTree,
-    /// length of the pieces in which a line is followed, m: a box around a long one holds too many
-    /// faces
+    /// length of the pieces of a line, m: a box around a long one holds too many faces
     piece: f64,
-    /// what the faces are called, where the mesh is a part of another
+    /// numbers of the faces in the whole mesh, if this is a part
     names: Option<&'a [u32]>,
     query: BoxQuery,
 }
@@ -69,8 +67,8 @@ impl<'a> Rays<'a> {
                 let distance = crossing(&self.mesh.triangle(face), from, direction)?;
                 (distance >= 0.0 && distance <= reach).then_some(RayHit { distance, face })
             });
-            // a face of this box may be crossed in a later one, behind a nearer face that is not
-            // here
+            // a later box may hold the crossing of a face from this box, behind a nearer face that
+            // is not here
             let nearest =
                 found.min_by(|a, b| a.distance.total_cmp(&b.distance).then(a.face.cmp(&b.face)));
             if let Some(nearest) =
@@ -85,14 +83,14 @@ impl<'a> Rays<'a> {
         None
     }
 
-    /// How far the line is free, at most `reach`, m.
+    /// Free length of a line, at most `reach`, m.
     pub fn free(&mut self, from: &Point3<f64>, direction: &Vector3<f64>, reach: f64) -> f64 {
         self.first(from, direction, reach)
             .map_or(reach, |crossing| crossing.distance)
     }
 }
 
-/// Where a line meets the plane of a triangle, if inside of it; edges belong to it.
+/// Distance to the crossing of a line with a triangle, edges included.
 fn crossing(
     [a, b, c]: &[Point3<f64>; 3],
     from: &Point3<f64>,

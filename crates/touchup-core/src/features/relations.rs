@@ -1,4 +1,4 @@
-//! The relations between touched features that a drawing would ask for.
+//! Relations between touched features, as in a drawing.
 
 use super::feature::{Feature, Kind};
 use crate::form::{
@@ -7,7 +7,7 @@ use crate::form::{
 use crate::names;
 
 names! {
-    /// What a relation is.
+    /// Kind of a relation.
     #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
     pub enum RelationKind {
         /// width of the zone or diameter of the cylinder, over the extent of the first feature; the
@@ -15,18 +15,17 @@ names! {
         Perpendicularity = "perpendicularity",
         /// the same, and the distance of two planes, or of an axis and a plane
         Parallelism = "parallelism",
-        /// diameter of the cylinder about the axis of the second feature that holds that of the
-        /// first
+        /// diameter of the cylinder about the second feature's axis around the first one's
         Coaxiality = "coaxiality",
-        /// of two axes across them
+        /// distance of two axes across them
         Distance = "distance",
     }
 }
 
-/// How a touched feature lies to another.
+/// Relation of a touched feature to another.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Relation {
-    /// what it is
+    /// kind of relation
     pub kind: RelationKind,
     /// number of the toleranced feature, whose extent counts
     pub of: u32,
@@ -36,26 +35,26 @@ pub struct Relation {
     pub zone: Option<Estimate>,
     /// between both axes, normals, or an axis and a plane, 0 to π/2, rad
     pub angle: Option<Estimate>,
-    /// of the middle of the toleranced feature from the datum, m
+    /// distance of the middle of the toleranced feature from the datum, m
     pub distance: Option<Estimate>,
-    /// of coaxial features: diameter of the circle about the datum in which the middle of the
-    /// toleranced axis lies, m
+    /// of coaxial features: diameter of the circle about the datum through the middle of the
+    /// toleranced axis, m
     pub concentricity: Option<Estimate>,
 }
 
-/// Features are meant to be parallel or square when they are so within this, rad: 5°.
+/// Tolerance of features intended parallel or square, rad: 5°.
 const MEANT: f64 = 0.087;
-/// Axes are meant to be one when they are nearer than this share of the smaller diameter.
+/// Maximum distance of axes intended as one, as a share of the smaller diameter.
 const ONE_AXIS: f64 = 0.1;
-/// Features that are related with one another, at most: the first of each kind are the largest.
+/// Maximum number of related features: the first of each kind are the largest.
 const MOST_RELATED: usize = 24;
 
-/// Relations of features that were measured by touch, in the order of the features.
+/// Relations of features measured by touch, in the order of the features.
 ///
-/// - Of two planes, each to the one that reaches farther: parallelism and distance, or
+/// - Of two planes, each to the one with the larger extent: parallelism and distance, or
 ///   perpendicularity.
-/// - Of an axis and the plane that it is square to and nearest: perpendicularity; of an axis along
-///   a plane: parallelism and distance.
+/// - Of an axis and its nearest square plane: perpendicularity; of an axis along a plane:
+///   parallelism and distance.
 /// - Of two parallel axes, each to the longer: coaxiality, or their distance.
 pub fn relations(features: &[Feature]) -> Vec<Relation> {
     let of_shape = |shape: Shape| -> Vec<(&Feature, &Element)> {
@@ -104,7 +103,7 @@ fn cosine(a: &Element, b: &Element) -> f64 {
     a.direction.dot(&b.direction).abs()
 }
 
-/// How far what was touched reaches, m.
+/// Extent of the touches, m.
 fn reach(element: &Element) -> f64 {
     let from = |p| element.extent.iter().map(move |q| nalgebra::distance(p, q));
     element.extent.iter().flat_map(from).fold(0.0, f64::max)
@@ -113,8 +112,8 @@ fn reach(element: &Element) -> f64 {
 type Related<'a> = (&'a Feature, &'a Element);
 
 impl Relation {
-    /// Of two planes or two axes; `None` where they are neither parallel nor square, and of axes
-    /// that are not parallel.
+    /// Of two planes or two axes; `None` if neither parallel nor square, and for axes that are not
+    /// parallel.
     fn of_alike<'a>(one: &Related<'a>, other: &Related<'a>) -> Option<Self> {
         let (toleranced, datum) = if reach(one.1) > reach(other.1) {
             (other, one)

@@ -1,6 +1,5 @@
-//! Openings by their borders: where a sheet ends in a circle there is a hole, though it has no wall;
-//! and where a plane of a drawing is left or ends in a closed line, something of any outline is cut
-//! in or stands on it.
+//! Openings by their borders: a circular border of a sheet is a hole without a wall; and a closed
+//! outline in a plane of a drawing is a recess or a boss of any shape.
 
 use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
@@ -20,7 +19,7 @@ use crate::numeric::{mean, tangent_basis};
 #[derive(Clone, Debug)]
 pub(super) struct RoundOpening {
     pub fit: Fit<Cylinder>,
-    /// in the middle of it, m, in O
+    /// its middle, m, in O
     pub centre: Point3<f64>,
     /// unit vector out of the part
     pub out: Vector3<f64>,
@@ -28,57 +27,57 @@ pub(super) struct RoundOpening {
     pub corners: Vec<Point3<f64>>,
 }
 
-/// What is cut into a plane, or stands on it, and is neither round nor a slot.
+/// A recess in a plane, or a boss on it, that is neither round nor a slot.
 #[derive(Clone, Debug)]
 pub(super) struct OpeningOutline {
     /// a hole, or a boss
     pub kind: Kind,
     /// the circle nearest to it
     pub rim: RoundOpening,
-    /// from the plane to the floor or the top, of what goes through to the other side, m
+    /// distance from the plane to the floor or the top, or through to the other side, m
     pub depth: f64,
     /// whether it goes through; of a boss `None`
     pub through: Option<bool>,
-    /// how far it is off the circle
+    /// its deviation from the circle
     pub form: RoundForm,
 }
 
 /// A loop of border edges, in the order of their faces: the part is on its left.
 struct Loop {
     corners: Vec<Point3<f64>>,
-    /// of the edge that begins at each corner its face, or the one across it
+    /// for the edge from each corner its face, or the one across it
     faces: Vec<u32>,
 }
 
-/// A round opening has at least so many corners: a missing face or the faces around a missing
+/// Minimum number of corners of a round opening: a missing face or the faces around a missing
 /// vertex have fewer.
 const LEAST_CORNERS: usize = 12;
-/// Its corners are off the circle by at most this share of the radius, and by this in root mean
-/// square.
+/// Maximum deviation of its corners from the circle, and root mean square of it, as shares of the
+/// radius.
 const OFF: f64 = 0.05;
 const OFF_ROOT_MEAN_SQUARE: f64 = 0.025;
-/// Seen from the middle no edge spans more than this, rad: 45°.
+/// Maximum angle of an edge, seen from the middle, rad: 45°.
 const WIDEST: f64 = PI / 4.0;
-/// Edges longer than this share of an outline are followed in pieces of this length.
+/// Maximum length between points on an outline, as a share of it.
 const PIECE: f64 = 1.0 / 48.0;
-/// Material within this share of the radius is beside the plane itself.
+/// Material within this share of the radius belongs to the plane itself.
 const AT_ONCE: f64 = 1e-3;
-/// Beside a corner of an outline by this share of the radius there is material.
+/// Distance of a place with material beside a corner of an outline, as a share of the radius.
 const BESIDE: f64 = 0.02;
-/// The edges go around once, without going back by more than this share of it.
+/// Maximum share of a turn by which the edges go back.
 const BACK: f64 = 0.05;
-/// The part around an opening faces out of it: cosine of 66°. That of a wall which ends there does
-/// not.
+/// Minimum cosine between normals around an opening and the direction out of it: 66°. The end of a
+/// wall has less.
 const FACING: f64 = 0.4;
-/// So much of the edges has to.
+/// Minimum share of edges with such normals.
 const FACING_SHARE: f64 = 0.9;
-/// An opening is flat when it is within this many radii of a plane: then that has its axis …
+/// Maximum distance of a flat opening from a plane, in radii: the plane then gives its axis.
 const FLAT: f64 = 0.03;
-/// … to this, rad; otherwise its shape decides.
+/// Standard deviation of that axis, rad; without it the shape decides.
 const AXIS: f64 = 0.0087;
 
-/// All round openings, in order of their first faces. The longest border of each piece is where the
-/// piece ends.
+/// All round openings, in order of their first faces. The longest border of each piece is its outer
+/// end.
 pub(super) fn rims(parted: &Parted) -> Vec<RoundOpening> {
     let loops = loops(parted, open_edges(&parted.facets));
     let mut longest: BTreeMap<u32, (f64, usize)> = BTreeMap::new();
@@ -97,9 +96,9 @@ pub(super) fn rims(parted: &Parted) -> Vec<RoundOpening> {
         .collect()
 }
 
-/// Outlines of what is cut into the planes of a drawing or stands on them.
+/// Outlines of recesses in the planes of a drawing and of bosses on them.
 ///
-/// - `is_known`: by segment, whether it is a wall of something that has a name.
+/// - `is_known`: by segment, whether it is a wall of a known feature.
 pub(super) fn outlines(parted: &Parted, is_known: &[bool]) -> Vec<OpeningOutline> {
     let of_plane = |number: usize| {
         let is_of = move |face: u32| parted.segmentation.of_face[face as usize] == number as u32;
@@ -123,7 +122,7 @@ pub(super) fn outlines(parted: &Parted, is_known: &[bool]) -> Vec<OpeningOutline
         .collect()
 }
 
-/// Edges of one face alone, from which vertex to which.
+/// Edges of one face alone, with their start and end vertices.
 fn open_edges<'a>(facets: &'a Facets) -> impl Iterator<Item = (VertexId, VertexId, u32)> + use<'a> {
     facets.mesh.faces().flat_map(|(face, corners)| {
         let open = facets.open_edges(face.0);
@@ -131,9 +130,9 @@ fn open_edges<'a>(facets: &'a Facets) -> impl Iterator<Item = (VertexId, VertexI
     })
 }
 
-/// Closed chains of edges, those through a vertex where several meet left out.
+/// Closed chains of edges, without those through a vertex of several.
 ///
-/// - `edges`: from which vertex to which, and a face of each.
+/// - `edges`: start vertex, end vertex and a face of each.
 fn loops(parted: &Parted, edges: impl Iterator<Item = (VertexId, VertexId, u32)>) -> Vec<Loop> {
     let mut next: BTreeMap<VertexId, (VertexId, u32)> = BTreeMap::new();
     let mut forked: Vec<VertexId> = Vec::new();
@@ -181,10 +180,10 @@ impl Loop {
         self.edges().map(|(a, b)| (b - a).norm()).sum()
     }
 
-    /// Its middle, and the unit vector out of an opening that it goes around.
+    /// Its middle, and the unit vector out of an opening inside it.
     fn middle(&self) -> Option<(Point3<f64>, Vector3<f64>)> {
         let middle = Point3::from(mean(self.corners.iter().map(|p| p.coords)));
-        // the part is on the left: around an opening it is gone around clockwise
+        // the part is on the left: the loop around an opening is clockwise
         let area = self
             .edges()
             .map(|(a, b)| (a - middle).cross(&(b - middle)))
@@ -204,7 +203,7 @@ impl Loop {
         Self { corners, faces }
     }
 
-    /// What is cut into plane number `plane` or stands on it, if the loop goes around it.
+    /// The recess in plane number `plane` or the boss on it, if the loop goes around it.
     fn outline(&self, parted: &Parted, plane: usize, is_known: &[bool]) -> Option<OpeningOutline> {
         if self.corners.len() < LEAST_CORNERS {
             return None;
@@ -255,7 +254,7 @@ impl Loop {
         let by_corners = RoundForm::of_section(self.corners.iter(), &centre, &out)?;
         let is_circle = by_corners.roundness.minimum_zone.value <= SEEN_FACETS * parted.rounding?;
         let is_round = !is_circle && form.roundness.minimum_zone.value < 2.0 * OFF * radius;
-        // what ends in the plane itself is a groove around something
+        // a depth in the plane itself is a groove around an island
         (is_round && depth > AT_ONCE * radius).then_some(OpeningOutline {
             kind,
             rim: RoundOpening {
@@ -317,7 +316,7 @@ impl Loop {
         let off = self.corners.iter().map(|p| away(p).norm() - radius);
         let square = off.map(|off| off * off).sum::<f64>() / self.corners.len() as f64;
         let sigma = square.sqrt().max(rounding);
-        // triangles of a scan end before its rim does: all by as much as they please, up to an edge
+        // triangles of a scan end before its rim: all by any length, up to an edge
         let common_sigma = if parted.rounding.is_some() {
             0.0
         } else {
@@ -368,7 +367,7 @@ impl Loop {
 
     /// Whether it goes around a place once.
     fn goes_around(&self, centre: &Point3<f64>, out: &Vector3<f64>) -> bool {
-        // `out` looks at us: the edges go clockwise
+        // `out` points at the viewer: the edges go clockwise
         let back: f64 = self.turns(centre, out).map(|turn| turn.max(0.0)).sum();
         let around: f64 = self.turns(centre, out).sum();
         back < BACK * TAU && (around + TAU).abs() < BACK

@@ -1,4 +1,4 @@
-//! A mesh parted into segments, with queries.
+//! A segmented mesh, with queries.
 
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
@@ -14,32 +14,32 @@ use super::segment::{Segment, Segmentation};
 use crate::mesh::{FaceTree, TriMesh, VertexId};
 use crate::numeric::tangent_basis;
 
-/// A parted mesh.
+/// A segmented mesh.
 pub(super) struct Parted<'a> {
     pub facets: Facets<'a>,
     pub tree: &'a FaceTree,
     pub bodies: Bodies,
     pub segmentation: Segmentation,
-    /// of a drawing how far corners are off by rounding, m; `None`: the mesh was measured
+    /// rounding error of a drawing's corners, m; `None`: a measured mesh
     pub rounding: Option<f64>,
-    /// of the box around all, m
+    /// diagonal of the box around all, m
     pub diagonal: f64,
     /// median length of an edge, m
     pub edge: f64,
 }
 
-/// Directions in which the surroundings of an axis are examined.
+/// Number of directions that examine the surroundings of an axis.
 const AROUND: usize = 24;
-/// A segment of less area than this is no neighbour worth naming, in squared diagonals.
+/// Minimum area of a neighbour to name, in squared diagonals.
 const LEAST_AREA: f64 = 1e-5;
-/// A plane or a shaft is worth telling from this area on, in squared diagonals.
+/// Minimum area of a plane or a shaft to report, in squared diagonals.
 const LARGE_AREA: f64 = 1e-3;
 /// A plane around an opening is square to the axis within 20°.
 const SQUARE: f64 = 0.94;
 
-/// The same surface with its faces in the order of their places, from below, each from its first
-/// corner on, and its vertices as faces use them. What depends on the order in which faces are met
-/// depends on the surface alone then.
+/// The same surface with its faces in the order of their positions, from below, each from its first
+/// corner on, and its vertices in the order of the faces. Results that depend on the order of faces
+/// then depend on the surface alone.
 pub(super) fn numbered_by_place(mesh: &TriMesh) -> TriMesh {
     let place = |vertex: u32| mesh.position(VertexId(vertex));
     let order = |&a: &u32, &b: &u32| {
@@ -52,7 +52,7 @@ pub(super) fn numbered_by_place(mesh: &TriMesh) -> TriMesh {
         .collect();
     by_place.sort_unstable_by(order);
     let mut rank = vec![NONE; mesh.vertex_slots()];
-    // those at one place have one rank
+    // vertices at one position have one rank
     for (number, alike) in by_place.chunk_by(|a, b| order(a, b).is_eq()).enumerate() {
         for &vertex in alike {
             rank[vertex as usize] = number as u32;
@@ -115,17 +115,17 @@ impl<'a> Parted<'a> {
         &self.segmentation.segments[number]
     }
 
-    /// Whether a segment is large enough to be named beside others.
+    /// Whether a segment is large enough to name beside others.
     pub fn is_strong(&self, number: usize) -> bool {
         self.segment(number).area > LEAST_AREA * self.diagonal * self.diagonal
     }
 
-    /// Whether a surface of this area, m², is worth telling.
+    /// Whether a surface of this area, m², is large enough to report.
     pub fn is_large(&self, area: f64) -> bool {
         area > LARGE_AREA * self.diagonal * self.diagonal
     }
 
-    /// The plane of a segment, if it is flat.
+    /// The plane of a segment, if flat.
     pub fn plane(&self, number: usize) -> Option<&Plane> {
         self.segment(number).primitive.plane()
     }
@@ -139,7 +139,7 @@ impl<'a> Parted<'a> {
         (0..self.segmentation.segments.len()).filter_map(plane)
     }
 
-    /// What is around a segment.
+    /// Surroundings of a segment.
     pub fn around(&self, number: usize) -> Surroundings<'_> {
         self.bodies.around(
             self.segment(number).faces.first().copied(),
@@ -148,14 +148,14 @@ impl<'a> Parted<'a> {
         )
     }
 
-    /// The segment of the face closest to `p`, when one is within `reach`, m.
+    /// The segment of the face closest to `p` within `reach`, m.
     pub fn segment_at(&self, around: &Surroundings, p: &Point3<f64>, reach: f64) -> Option<usize> {
         let number = self.segmentation.of_face[around.closest(p, reach)? as usize];
         (number != NONE).then_some(number as usize)
     }
 
-    /// How far along the unit vector `direction` from `from` a segment's surface is left, m; `None`
-    /// where it is not met, and for cones.
+    /// Distance from `from` along the unit vector `direction` to the exit from a segment's surface,
+    /// m; `None`: no hit, or a cone.
     pub fn exit(&self, number: usize, from: &Point3<f64>, direction: &Vector3<f64>) -> Option<f64> {
         match &self.segment(number).primitive {
             Primitive::Plane(plane) => plane.along(from, direction),
@@ -169,8 +169,8 @@ impl<'a> Parted<'a> {
         matches!(self.segment(number).primitive, Primitive::Cylinder(cylinder) if !cylinder.concave)
     }
 
-    /// The plane, or the cylinder with the material inside, that most of some rings lie on which
-    /// faces along `direction`, and its share of them.
+    /// The plane, or the cylinder with the material inside, under most of some rings, facing along
+    /// `direction`, and its share of them.
     ///
     /// - as [`Self::plane_around`]
     pub fn land_around(
@@ -189,11 +189,10 @@ impl<'a> Parted<'a> {
         self.surface_around(around, middle, direction, radii, reach, is_land)
     }
 
-    /// The plane that most of some rings lie on which faces along `direction`, and its share of
-    /// them.
+    /// The plane under most of some rings, facing along `direction`, and its share of them.
     ///
     /// - `middle`, `radii`: of the rings, square to `direction`, m
-    /// - `reach`: how far the plane may be, m
+    /// - `reach`: maximum distance of the plane, m
     pub fn plane_around(
         &self,
         around: &Surroundings,

@@ -1,4 +1,4 @@
-//! A mesh parted into pieces that one surface each explains.
+//! Segmentation of a mesh into pieces of one surface each.
 
 use std::collections::BTreeSet;
 
@@ -17,11 +17,11 @@ pub(crate) struct Segment {
     pub faces: Vec<u32>,
     /// m²
     pub area: f64,
-    /// a corner farther than this from the primitive does not belong to it, m
+    /// maximum distance of its corners from the primitive, m
     pub tolerance: f64,
     /// its corners lie on it as in a drawing, not as in a measurement
     pub is_exact: bool,
-    /// share of a turn over which contacts alone show it, 0 where they do not
+    /// share of a turn that contacts alone show, otherwise 0
     pub felt_turn: f64,
 }
 
@@ -35,7 +35,7 @@ pub struct Segmentation {
 }
 
 impl Segmentation {
-    /// Adds a segment, which takes its faces from those that had them; returns its number.
+    /// Adds a segment, which takes its faces from others; returns its number.
     pub(super) fn add(&mut self, facets: &Facets, mut segment: Segment) -> usize {
         let number = self.segments.len() as u32;
         segment.faces.sort_unstable();
@@ -57,10 +57,10 @@ impl Segmentation {
     }
 
     /// Lets each round surface of a drawing take the pieces beside it that lie on its chords as a
-    /// whole: a tessellation puts corners there where a neighbour needs one, and its facets may
-    /// then look like planes of their own.
+    /// whole: a tessellation puts corners of neighbours there, and its facets may then look like
+    /// planes of their own.
     ///
-    /// - `tolerance`: how far chords are off the surface, m.
+    /// - `tolerance`: distance of chords from the surface, m.
     pub(super) fn join_chords(&mut self, facets: &Facets, tolerance: f64) {
         for number in 0..self.segments.len() {
             let Segment {
@@ -130,7 +130,7 @@ impl Segmentation {
 
     /// Merges planes that continue each other.
     ///
-    /// - `beside`: pairs of segments that meet, over seams too, the smaller number first.
+    /// - `beside`: pairs of adjacent segments, over seams too, the smaller number first.
     pub(super) fn join_planes(&mut self, facets: &Facets, beside: impl Iterator<Item = [u32; 2]>) {
         let mut sets = DisjointSets::of(self.segments.len());
         for pair in beside {
@@ -142,7 +142,7 @@ impl Segmentation {
         let parts = std::mem::take(&mut self.segments);
         let mut number_of = vec![0; parts.len()];
         let mut joint = Vec::new();
-        // the largest is first, so that each root comes before what belongs to it
+        // the largest is first, so that each root comes before its members
         for (at, part) in parts.into_iter().enumerate() {
             let of = sets.root(at as u32) as usize;
             if of == at {
@@ -174,7 +174,7 @@ impl Segmentation {
 
 /// Normals of one plane differ by less than this: 4°.
 const SAME_NORMAL: f64 = 0.9976;
-/// The middle of a piece is off the plane of the larger one by no more than so many tolerances.
+/// Maximum distance of the middle of a piece from the plane of the larger one, in tolerances.
 const SAME_PLANE: f64 = 1.5;
 
 /// Whether the smaller of two segments lies on the larger.

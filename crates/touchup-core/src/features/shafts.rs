@@ -1,5 +1,5 @@
-//! Shafts: round walls with the material inside that are surfaces of the part, and no edges that the
-//! scan has smeared.
+//! Shafts: round walls with the material inside that are surfaces of the part, not edges smeared by
+//! the scan.
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
@@ -12,17 +12,18 @@ use super::segment::Segment;
 use super::walls::Wall;
 use crate::mesh::FaceId;
 
-/// A shaft covers more than this share of a turn: less is the rounding of an edge, which looks wider
-/// in a measured mesh.
+/// Minimum share of a turn of a shaft: less is the rounding of an edge, which looks wider in a
+/// measured mesh.
 const ROUNDED_EDGE: f64 = 0.3;
 const ROUNDED_EDGE_MEASURED: f64 = 0.45;
-/// A shaft has faces between its ends: the cylinder through four walls of a block has few.
+/// Minimum filled share of a shaft between its ends: the cylinder through four walls of a block has
+/// few faces.
 const FILLED: f64 = 0.8;
-/// Rounds in which two planes share corners among them.
+/// Number of rounds in which two planes share corners among them.
 const ROUNDS: usize = 8;
 
-/// Whether a wall has the material inside and is large enough to be reported. What was not felt of a
-/// measured mesh has to be one without the steps beside it, and to be round.
+/// Whether a wall has the material inside and is large enough to report. In a measured mesh an
+/// untouched wall must also hold without the steps beside it, and be round.
 pub(super) fn is_shaft(measure: &Measure, borders: &Borders, wall: &Wall) -> bool {
     let parted = measure.observed.parted;
     let of_wall = wall.segments.iter().map(|&number| parted.segment(number));
@@ -50,8 +51,8 @@ pub(super) fn is_shaft(measure: &Measure, borders: &Borders, wall: &Wall) -> boo
     })
 }
 
-/// The faces of a wall but for the steps from planes that were felt to what the scan has beside
-/// them: those lie on the planes within the tolerance of the wall, where it faces otherwise.
+/// The faces of a wall without steps from touched planes to the scan beside them: those lie on the
+/// planes within the tolerance of the wall, with another normal than its own.
 fn without_steps(measure: &Measure, borders: &Borders, wall: &Wall) -> Vec<u32> {
     let parted = measure.observed.parted;
     let is_own = |number: u32| wall.segments.contains(&(number as usize));
@@ -85,7 +86,7 @@ fn without_steps(measure: &Measure, borders: &Borders, wall: &Wall) -> Vec<u32> 
     of_wall.copied().filter(|face| !is_step(face)).collect()
 }
 
-/// Whether two planes explain a wall better than it does itself: it is an edge that was smeared.
+/// Whether two planes explain a wall better than its own surface: a smeared edge.
 ///
 /// - `corners`: of its faces, m, in O, with their shares of the area, m².
 fn is_edge(wall: &Wall, primitive: &Primitive, corners: &[(Point3<f64>, f64)]) -> bool {

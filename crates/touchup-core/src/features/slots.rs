@@ -16,14 +16,13 @@ use crate::numeric::{mean, without_repeats};
 /// A void between two walls that face each other.
 #[derive(Clone, Debug)]
 pub(super) struct Slot {
-    /// numbers of the walls; none where contacts alone show them
+    /// numbers of the walls; empty if contacts alone show them
     pub walls: Vec<usize>,
-    /// numbers of the segments that end it, `None` where it is open or ends at nothing that has a
-    /// name
+    /// numbers of the segments that end it, `None` if open or without a named segment
     pub ends: [Option<usize>; 2],
-    /// of its ends
+    /// shape of its ends
     pub shape: Ends,
-    /// in the middle of the opening, m, in O
+    /// middle of the opening, m, in O
     pub centre: Point3<f64>,
     /// unit vector out of the opening
     pub out: Vector3<f64>,
@@ -31,31 +30,31 @@ pub(super) struct Slot {
     pub direction: Vector3<f64>,
     /// m
     pub width: f64,
-    /// m; at an open end to where the walls end
+    /// m; at an open end to the ends of the walls
     pub length: f64,
     /// m
     pub depth: f64,
-    /// `None` where its floor was not felt, and no opening on the other side
+    /// `None`: neither a touched floor nor an opening on the other side
     pub through: Option<bool>,
-    /// number of the plane that is its floor
+    /// number of the plane of its floor
     pub floor: Option<usize>,
-    /// numbers of the touches on its floor, where contacts alone show it
+    /// numbers of the touches on its floor, if contacts alone show it
     pub felt_floor: Vec<u32>,
     /// number of the plane, or of the cylinder with the material inside, around the opening
     pub land: usize,
-    /// whether both ends are closed by planes, so that it is no slot unless it is long
+    /// whether planes close both ends, so that only a long one is a slot
     pub is_boxed: bool,
-    /// whether both ends are there
+    /// whether both ends exist
     pub is_closed: bool,
-    /// whether a wall aslant closes an end: it is a recess of another outline
+    /// whether a wall aslant closes an end: a recess of another outline
     pub is_aslant: bool,
-    /// area over which the walls face each other, m²
+    /// facing area of the walls, m²
     pub area: f64,
 }
 
 impl Slot {
-    /// Whether the middle of another void is between its walls, and both are there over more than
-    /// half of the depth of the shallower: how deep each of them is seen may differ.
+    /// Whether the middle of another void is between its walls, and both overlap over more than
+    /// half of the depth of the shallower: their apparent depths may differ.
     pub fn holds(&self, other: &Self) -> bool {
         let v = other.centre - self.centre;
         let middle = v - other.out * (other.depth / 2.0);
@@ -73,49 +72,49 @@ impl Slot {
 const PARALLEL: f64 = 0.9945;
 /// A land or a floor is square to the walls within 9°.
 const SQUARE: f64 = 0.15;
-/// Points of a wall from which rays are cast across.
+/// Number of points on a wall with rays across.
 const SAMPLES: usize = 60;
-/// Share of the smaller wall that faces the other.
+/// Minimum share of the smaller wall that faces the other.
 const LEAST_SHARE: f64 = 0.2;
-/// A half-round end covers these shares of a turn, and is this much on its side of the slot
-/// (cosine).
+/// Range of the turn of a half-round end, as shares, and minimum cosine of its direction to its
+/// side of the slot.
 const END_TURN: std::ops::Range<f64> = 0.42..0.75;
 const AWAY: f64 = 0.7;
-/// Axes of both ends are parallel within 12°: short, they hardly have one.
+/// Axes of both ends are parallel within 12°: short ends hardly determine one.
 const ENDS_PARALLEL: f64 = 0.978;
-/// A slot is seen between two ends when they are no farther apart than this many widths.
+/// Maximum distance of two ends of a slot, in widths.
 const LONGEST: f64 = 8.0;
-/// A ring around an end is this much wider.
+/// Width of a ring around an end, in widths of the end.
 const RINGS: f64 = 1.15;
-/// A slot is longer than this many widths; when its ends are flat, longer than that many.
+/// Minimum length of a slot, in widths; and with flat ends.
 pub(super) const LONG: f64 = 1.2;
 pub(super) const LONG_BOX: f64 = 2.0;
-/// A slot that is open at an end or has no floor is not wider than this many depths.
+/// Maximum width of a slot with an open end or without a floor, in depths.
 pub(super) const WIDE: f64 = 3.0;
-/// A pocket or a closed slot is not wider than this many depths: shallower is a step that an uneven
+/// Maximum width of a pocket or a closed slot, in depths: shallower is a step that an uneven
 /// surface has too.
 pub(super) const SHALLOW: f64 = 12.0;
-/// A pocket is at least as long as wide, but for what the sides of a square one differ by.
+/// Minimum length of a pocket, in widths: allows for the sides of a square one.
 pub(super) const SQUARISH: f64 = 0.95;
-/// A pocket's walls face each other over this share of them.
+/// Minimum facing share of a pocket's walls.
 const POCKET_SHARE: f64 = 0.5;
 /// Cosine between a slot and the normal of a wall that closes it aslant: 20° to 75°.
 const ASLANT: std::ops::Range<f64> = 0.26..0.94;
-/// Voids are the same when widths and places agree within this share of the width.
+/// Tolerance of widths and positions of one void, as a share of the width.
 const SAME: f64 = 0.4;
-/// The axis of an end is where it should be within this share of the width.
+/// Tolerance of the axis of an end, as a share of the width.
 const ABOUT: f64 = 0.1;
-/// Lengths are the same within this share.
+/// Ratio above which lengths are the same.
 const AS_LONG: f64 = 0.999;
-/// A line that starts on a wall starts this share of the width off it.
+/// Offset from a wall of a line that starts on it, as a share of the width.
 const OFF: f64 = 1e-3;
-/// What is across is looked for up to so many diagonals away, and a void is not wider.
+/// Maximum width of a void, and search distance across it, in diagonals.
 const FARTHEST: f64 = 1.5;
-/// Pieces in which a line across the part is followed.
+/// Number of pieces of a line across the part.
 const PIECES: f64 = 64.0;
-/// Faces closer together on a line than this, in diagonals, are one.
+/// Minimum distance of two faces on a line, in diagonals.
 const APART: f64 = 1e-9;
-/// Faces that are met on a line before the wall across: more are no wall.
+/// Maximum number of faces on a line before the wall across: more are no wall.
 const MOST_MET: usize = 8;
 
 /// All slots, and all pockets.
@@ -159,8 +158,7 @@ pub(super) fn slots(
     )
 }
 
-/// Slots of which both half-round ends are there: what is between them may be in pieces, or hardly
-/// there.
+/// Slots with both half-round ends: the walls between may be in pieces, or hardly there.
 fn between_round_ends(parted: &Parted, of_face: &[u32], walls: &[Wall]) -> Vec<Slot> {
     let is_end =
         |wall: &&Wall| wall.is_concave && !wall.is_cone() && END_TURN.contains(&wall.coverage);
@@ -174,7 +172,7 @@ fn between_round_ends(parted: &Parted, of_face: &[u32], walls: &[Wall]) -> Vec<S
     slots
 }
 
-/// The slot that two half-round walls close, when each is open towards the other.
+/// The slot between two half-round walls, each open towards the other.
 #[expect(clippy::too_many_lines)]
 fn slot_of_ends(parted: &Parted, of_face: &[u32], ends: [&Wall; 2]) -> Option<Slot> {
     let [one, other] = ends;
@@ -218,7 +216,7 @@ fn slot_of_ends(parted: &Parted, of_face: &[u32], ends: [&Wall; 2]) -> Option<Sl
     }
     let sides = sides.map(segment_of);
     let rings = [RINGS * width / 2.0];
-    // the opening is where a plane, or a cylinder, is around one of the ends
+    // the opening is on the side of a plane, or a cylinder, around one of the ends
     let opening = [1.0, -1.0].into_iter().find_map(|sign| {
         let out = axis * sign;
         ends.into_iter().find_map(|end| {
@@ -265,7 +263,7 @@ fn slot_of_ends(parted: &Parted, of_face: &[u32], ends: [&Wall; 2]) -> Option<Sl
         is_boxed: false,
         is_closed: true,
         is_aslant: false,
-        // flat walls that are there say more
+        // existing flat walls take precedence
         area: 0.0,
     })
 }
@@ -276,18 +274,18 @@ fn is_pocket(slot: &Slot) -> bool {
     is_closed && slot.length > SQUARISH * slot.width && slot.width < SHALLOW * slot.depth
 }
 
-/// A void may be seen by several pairs of walls: the largest pair names it.
+/// Drops repeated views of a void by several pairs of walls: the largest pair names it.
 fn distinct(mut all: Vec<Slot>, is_same: fn(&Slot, &Slot) -> bool) -> Vec<Slot> {
     all.sort_by(|a, b| b.area.total_cmp(&a.area));
     without_repeats(all, is_same)
 }
 
-/// Each pair of walls of a pocket sees it.
+/// Whether two views by pairs of walls are one pocket.
 fn is_same_pocket(one: &Slot, other: &Slot) -> bool {
     (one.centre - other.centre).norm() < SAME * one.width
 }
 
-/// The walls of a slot may be in pieces.
+/// Whether two voids are one slot, whose walls may be in pieces.
 fn is_same_slot(one: &Slot, other: &Slot) -> bool {
     let between = other.centre - one.centre;
     let along = between.dot(&one.direction);
@@ -298,16 +296,16 @@ fn is_same_slot(one: &Slot, other: &Slot) -> bool {
         && along.abs() < (one.length + other.length) / 2.0
 }
 
-/// What lies across from a point of a wall.
+/// Faces across from a point of a wall.
 struct View {
     from: Point3<f64>,
-    /// faces on the line along the normal: how far, m, and of which segment; up to the first that
-    /// is no part of the wall itself, however wide the void
+    /// faces on the line along the normal: distance, m, and segment; up to the first beyond the
+    /// wall itself, however wide the void
     met: Vec<(f64, u32)>,
 }
 
 impl View {
-    /// The segment that is first met across a void of `width`.
+    /// The first segment across a void of `width`.
     fn across(&self, width: f64) -> Option<u32> {
         let &(distance, segment) = self
             .met
@@ -317,7 +315,7 @@ impl View {
     }
 }
 
-/// What each point of a wall sees: many other walls may face it, and it sees the same.
+/// Views from the points of a wall, computed once: many other walls may face it.
 fn views(parted: &Parted, of_face: &[u32], wall: usize, normal: &Vector3<f64>) -> Vec<View> {
     let mut rays = parted.around(wall).rays(parted.diagonal / PIECES);
     let farthest = FARTHEST * parted.diagonal;
@@ -341,7 +339,7 @@ fn views(parted: &Parted, of_face: &[u32], wall: usize, normal: &Vector3<f64>) -
 
 /// The void between two walls, and the share of the smaller one that faces the other.
 ///
-/// - `seen`: what the walls see that were looked at so far.
+/// - `seen`: views of the walls until now.
 fn between(
     parted: &Parted,
     of_face: &[u32],
@@ -395,7 +393,7 @@ fn between(
     });
     let seen: Vec<Slot> = seen.collect();
     let longest = seen.iter().map(|slot| slot.length).fold(0.0, f64::max);
-    // as long from both of its sides, as the neck of a T-slot is: from where it is deeper
+    // equally long from both of its sides, as the neck of a T-slot: from the deeper side
     let deepest = seen
         .into_iter()
         .filter(|slot| slot.length > AS_LONG * longest);
@@ -427,7 +425,7 @@ pub(super) fn samples(parted: &Parted, number: usize) -> Vec<Point3<f64>> {
     points
 }
 
-/// Planes and cylinders that fall away from one of the walls, square to both: around an opening.
+/// Planes and cylinders around an opening: they fall away from one of the walls, square to both.
 /// With the outward direction at the middle of the void.
 fn lands(
     parted: &Parted,
@@ -522,7 +520,7 @@ fn opened(parted: &Parted, of_face: &[u32], seen: &Opened) -> Option<Slot> {
         let is_flat = number.is_some_and(|number| is_square(parted, number, &along));
         flat += usize::from(is_flat);
         is_aslant |= number.is_some_and(|number| is_wall_aslant(parted, number, &along, &out));
-        // what only reaches there over a seam, as a floor does, is no end
+        // a floor that only reaches there over a seam is no end
         let met = number.filter(|&number| is_flat || is_round_end(parted, number, &out, width));
         ends[at] = met.or_else(|| {
             round_end_about(
@@ -582,8 +580,8 @@ fn is_wall_aslant(
     ASLANT.contains(&-normal.dot(along)) && normal.dot(out).abs() < SQUARE
 }
 
-/// The half-round end about a point: where the wall has few touches it may be in pieces, and the
-/// line meet another.
+/// The half-round end about a point: with few touches the wall may be in pieces, and the line may
+/// meet another.
 fn round_end_about(
     parted: &Parted,
     middle: &Point3<f64>,
@@ -644,7 +642,7 @@ mod tests {
             out: -Vector3::z(),
             ..slot(0.0, 11.0)
         };
-        // felt at its top alone, and closed in the mesh far below; or seen from below
+        // touched at its top alone, and closed in the mesh far below; or seen from below
         for other in [slot(0.0, 11.0), slot(0.1, 3.0), upside_down] {
             assert!(slot(0.0, 4.0).holds(&other) && other.holds(&slot(0.0, 4.0)));
         }

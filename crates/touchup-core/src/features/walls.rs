@@ -1,4 +1,4 @@
-//! Round walls: the segments on one cylinder, or one cone, merged.
+//! Round walls: the merged segments on one cylinder, or one cone.
 
 use std::f64::consts::{PI, TAU};
 
@@ -21,33 +21,32 @@ pub(super) struct Wall {
     pub is_concave: bool,
     /// numbers of its segments, the largest first
     pub segments: Vec<usize>,
-    /// a point of the axis, m, in O: lengths along it are measured from here
+    /// a point of the axis, m, in O: origin of lengths along it
     pub origin: Point3<f64>,
     /// unit vector; of a cone from the apex into it
     pub axis: Vector3<f64>,
-    /// from where to where it goes along the axis, m
+    /// range along the axis, m
     pub ends: [f64; 2],
-    /// share of the turn that it covers, in the mesh or by contacts
+    /// covered share of the turn, in the mesh or by contacts
     pub coverage: f64,
-    /// that by contacts alone, 0 where they are not all around
+    /// share of the turn covered by contacts alone, 0 unless they are all around
     pub felt_turn: f64,
-    /// share of what it is between its ends that its faces cover
+    /// share of its area between its ends that its faces cover
     pub filled: f64,
-    /// unit vector from the axis to the middle of the parts of the turn that it covers; 0 where
-    /// there is none
+    /// unit vector from the axis to the middle of the covered parts of the turn; 0 if undefined
     pub towards: Vector3<f64>,
 }
 
-/// Into so many parts a turn is divided.
+/// Number of parts of a turn.
 const PARTS: usize = 72;
-/// Contacts over this share of a turn are all around: those on the end of a slot, or in a notch,
-/// are not.
+/// Minimum share of a turn of contacts all around: those on the end of a slot, or in a notch, are
+/// not.
 pub(super) const ALL_AROUND: f64 = 0.75;
 /// Axes of one wall differ by less: 6°.
 const SAME_AXIS: f64 = 0.9945;
-/// Radii of one wall differ by less than this share, and so do places of the axis.
+/// Tolerance of radii, and of positions of the axis, of one wall, as a share.
 const SAME_RADIUS: f64 = 0.08;
-/// Pieces of a wall are no farther apart along the axis than this many radii.
+/// Maximum gap between pieces of a wall along the axis, in radii.
 pub(super) const SAME_WALL: f64 = 2.0;
 
 impl Wall {
@@ -72,7 +71,7 @@ impl Wall {
         walls
     }
 
-    /// The wall that these segments are.
+    /// The wall of these segments.
     fn of(facets: &Facets, segmentation: &Segmentation, segments: Vec<usize>) -> Option<Self> {
         let of_wall = |&number: &usize| segmentation.segments[number].faces.iter().copied();
         let faces: Vec<u32> = segments.iter().flat_map(of_wall).collect();
@@ -95,7 +94,7 @@ impl Wall {
         })
     }
 
-    /// The wall that these faces are; `None` for a plane.
+    /// The wall of these faces; `None` for a plane.
     #[expect(clippy::too_many_lines)]
     pub fn of_faces(
         facets: &Facets,
@@ -199,7 +198,7 @@ impl Wall {
             && off < share * self.radius().max(other.radius())
     }
 
-    /// Distance between the walls along the axis, m; negative where they overlap.
+    /// Distance between the walls along the axis, m; negative for an overlap.
     pub fn gap(&self, other: &Self) -> f64 {
         let along = other
             .ends
@@ -236,7 +235,7 @@ impl Wall {
     }
 }
 
-/// From which to which angle the corners of a face reach, rad.
+/// Range of angles of the corners of a face, rad.
 fn span_of(angles: [f64; 3]) -> [f64; 2] {
     let from = angles[0];
     let turned = angles.map(|angle| (angle - from + PI).rem_euclid(TAU) - PI);
@@ -246,13 +245,13 @@ fn span_of(angles: [f64; 3]) -> [f64; 2] {
     ]
 }
 
-/// The share of a turn that spans cover together, but for gaps of less than a part: the same
-/// however the turn is counted.
+/// Share of a turn that spans cover together, without gaps of less than a part: the same whatever
+/// the start of the turn.
 fn covered_share(spans: Vec<[f64; 2]>) -> f64 {
     let begun = spans
         .into_iter()
         .map(|[low, high]| (low.rem_euclid(TAU), high - low));
-    // what goes beyond the turn begins it
+    // an excess beyond the turn begins it
     let mut spans: Vec<[f64; 2]> = begun
         .flat_map(|(low, length)| {
             let high = low + length;

@@ -80,9 +80,8 @@ impl Stadium {
         self.pose_of.rotation * Vector3::x()
     }
 
-    /// Position along x of the end in direction `sign`; an untouched end goes beyond the constraint
-    /// of all points, for otherwise the last touches of the walls, with their noise, would decide
-    /// its position.
+    /// Position along x of the end in direction `sign`; an untouched end goes beyond all points,
+    /// for otherwise the last touches of the walls, with their noise, would decide its position.
     fn end_beyond(&self, points: &[Vector3<f64>], sign: f64) -> f64 {
         let faces_end = |q: &&Vector3<f64>| {
             q.x * sign > 0.0 && self.distance_at(q).normal.x.abs() > LEAST_ALONG
