@@ -1,4 +1,4 @@
-//! What is known of the calibration that the uncertainties rest on, and how old it is.
+//! Known calibration behind the uncertainties, and its age.
 
 use std::path::Path;
 use std::time::SystemTime;
@@ -11,7 +11,7 @@ use super::source::InspectionSource;
 use crate::scene::Scene;
 use crate::stylus::ProbedPoint;
 
-/// One line of the table: what, its value, and where that is from or how old it is.
+/// One line of the table: name, value, and source or age.
 pub(super) struct CalibrationLine {
     pub what: &'static str,
     pub value: String,
@@ -20,7 +20,7 @@ pub(super) struct CalibrationLine {
 
 const NOT_STATED: &str = "not stated";
 
-/// The state of the calibration, as far as scene and touches say it.
+/// State of the calibration, from scene and touches.
 pub(super) fn calibration_of(
     source: &InspectionSource,
 ) -> Result<Vec<CalibrationLine>, InspectionError> {
@@ -61,7 +61,7 @@ fn of_touches(touches: &[ProbedPoint]) -> Vec<CalibrationLine> {
         all.sort_by(f64::total_cmp);
         all[all.len() / 2] * 1e3
     };
-    // 0 is that of a file that does not say it
+    // 0: the file does not state it
     let mm = |number: f64| {
         if number > 0.0 {
             format!("{number:.4} mm")
@@ -166,7 +166,7 @@ fn changed(path: &Path) -> String {
         .map_or_else(|_| NOT_STATED.to_owned(), |at| age(at.into()))
 }
 
-/// A date and how long ago it was.
+/// A date and its age.
 fn age(at: DateTime<Utc>) -> String {
     let days = DateTime::<Utc>::from(SystemTime::now())
         .signed_duration_since(at)

@@ -1,5 +1,5 @@
-//! What the part should be: characteristics with their limits, from a file, or from the features of
-//! a CAD mesh.
+//! Nominal part: characteristics with their limits, from a file, or from the features of a CAD
+//! mesh.
 
 use std::path::Path;
 
@@ -18,16 +18,16 @@ use crate::io::nominal_file::{NominalRecord, NominalTolerance, is_nominal_file, 
 use crate::scan::read_scan;
 use crate::session::found;
 
-/// What is added to nominal values.
+/// Additions to nominal values.
 #[derive(Clone, Debug, Default)]
 pub struct DrawingParams {
-    /// of a CAD mesh
+    /// unit of a CAD mesh
     pub unit: MeshUnit,
-    /// tolerance of sizes that have none of their own
+    /// tolerance of sizes without one of their own
     pub general: Option<GeneralTolerance>,
-    /// … or ± this, mm
+    /// symmetric tolerance ± mm instead
     pub tolerance_mm: Option<f64>,
-    /// diameter of the zone for the position of what a CAD mesh has, mm
+    /// diameter of the position zone for features of a CAD mesh, mm
     pub position_mm: Option<f64>,
 }
 
@@ -36,25 +36,25 @@ pub struct Drawn {
     pub nominal: NominalRecord,
     pub quantity: InspectedQuantity,
     pub limits: ToleranceLimits,
-    /// where the limits are from
+    /// source of the limits
     pub from: String,
-    /// of a CAD mesh, by how much its facets make the size smaller than the circle through their
-    /// corners, which is the nominal value, mm
+    /// for a CAD mesh, loss of size by its facets, relative to the circle through their corners,
+    /// which is the nominal value, mm
     pub facets_mm: f64,
 }
 
 /// All characteristics of a part.
 pub struct PartDrawing {
     pub characteristics: Vec<Drawn>,
-    /// by whose places drawing and part are aligned
+    /// features whose places align drawing and part
     pub features: Vec<DrawnFeature>,
     pub file: InspectedFile,
-    /// what was left out of it, in words
+    /// omissions, in words
     pub notes: Vec<String>,
 }
 
 impl PartDrawing {
-    /// Reads nominal values, or makes them of the features of a CAD mesh.
+    /// Reads nominal values, or derives them from the features of a CAD mesh.
     pub fn read(path: &Path, params: &DrawingParams) -> Result<Self, InspectionError> {
         if is_nominal_file(path) {
             let records = read_nominal(path)?;
@@ -111,7 +111,7 @@ impl PartDrawing {
     }
 }
 
-/// By how much the facets of a CAD mesh make its sizes smaller; `None` if it has none.
+/// Loss of size by the facets of a CAD mesh; `None` without facets.
 fn facets_note(characteristics: &[Drawn]) -> Option<String> {
     let faceted = characteristics.iter().filter(|one| one.facets_mm > 0.0);
     let faceted: Vec<String> = faceted
@@ -127,7 +127,7 @@ fn facets_note(characteristics: &[Drawn]) -> Option<String> {
     (!faceted.is_empty()).then(note)
 }
 
-/// The features that characteristics are about, and those that are datums alone.
+/// Features of characteristics, and features that serve as datums alone.
 fn features_of_records(characteristics: &[Drawn]) -> Vec<DrawnFeature> {
     let mut features: Vec<(NominalRecord, DrawnFeature)> = Vec::new();
     for Drawn {
@@ -200,7 +200,7 @@ fn drawn_feature(record: &NominalRecord) -> DrawnFeature {
     }
 }
 
-/// As a unit vector.
+/// Axis as a unit vector.
 fn axis_of(record: &NominalRecord) -> Option<Measured<Vector3<f64>>> {
     Some(measured(
         Vector3::from(record.axis?).try_normalize(0.0)?,
@@ -208,7 +208,7 @@ fn axis_of(record: &NominalRecord) -> Option<Measured<Vector3<f64>>> {
     ))
 }
 
-/// Those of a CAD mesh, which are exact, by their kinds and numbers.
+/// Features of a CAD mesh, which are exact, named by kind and number.
 fn features_of_shapes(found: &[FeatureRecord]) -> Vec<DrawnFeature> {
     let mut counts = std::collections::BTreeMap::new();
     let feature = |record: &FeatureRecord| {
@@ -225,7 +225,7 @@ fn features_of_shapes(found: &[FeatureRecord]) -> Vec<DrawnFeature> {
     found.iter().filter_map(feature).collect()
 }
 
-/// A characteristic with its own limits, or those of the general tolerance.
+/// A characteristic with its own limits, or with the general tolerance.
 fn drawn(nominal: NominalRecord, facets_mm: f64, params: &DrawingParams) -> Result<Drawn, String> {
     let quantity = nominal
         .quantity()
@@ -279,11 +279,11 @@ fn features_of_mesh(path: &Path, params: &DrawingParams) -> Result<FeatureFile, 
     Ok(found(&scan.mesh, &[]).1)
 }
 
-/// Kinds that have sizes.
+/// Kinds with sizes.
 const WITH_SIZES: [&str; 6] = ["hole", "slot", "pocket", "boss", "notch", "cylinder"];
 
-/// Sizes of features as nominal values without tolerances, each with what facets take off it, mm;
-/// those of a through hole without its depth.
+/// Feature sizes as nominal values without tolerances, each with its loss by facets, mm; through
+/// holes without depth.
 fn of_features(features: &[FeatureRecord], params: &DrawingParams) -> Vec<(NominalRecord, f64)> {
     let mut records = Vec::new();
     let mut counts = std::collections::BTreeMap::new();
@@ -346,13 +346,13 @@ fn of_features(features: &[FeatureRecord], params: &DrawingParams) -> Vec<(Nomin
     records
 }
 
-/// To a micrometre: a drawing has no more.
+/// Rounds to a micrometre, the resolution of a drawing.
 fn rounded(mm: f64) -> f64 {
     (mm * 1e3).round() / 1e3
 }
 
-/// Nominal values to be edited: those of a CAD mesh, or else of what was measured, with the general
-/// tolerance where there is one.
+/// Nominal values for editing: from the CAD mesh, or else from the measurement, with the general
+/// tolerance if there is one.
 ///
 /// - `mesh`: the CAD mesh.
 ///

@@ -1,4 +1,4 @@
-//! Features as shapes: of the drawing, by whose places the measured ones are found, and of files.
+//! Features as shapes: nominal ones, which identify the measured ones, and features of files.
 
 use nalgebra::{Point3, Vector3};
 
@@ -8,18 +8,18 @@ use crate::io::features_file::FeatureRecord;
 /// A feature of the drawing.
 #[derive(Clone, Debug)]
 pub struct DrawnFeature {
-    /// of its characteristics; of a CAD mesh its kind and a number
+    /// names of its characteristics; for a CAD mesh its kind and a number
     pub names: Vec<String>,
-    /// the number of the measured one, where the drawing has it
+    /// number of the measured feature, if the drawing states it
     pub id: Option<u32>,
     /// kind, centre, axis and sizes in the frame of the drawing
     pub shape: Feature,
-    /// whether the drawing says where it is
+    /// whether the drawing states its place
     pub has_place: bool,
 }
 
 impl DrawnFeature {
-    /// The first of its names.
+    /// First name.
     pub fn name(&self) -> &str {
         self.names.first().map_or("", String::as_str)
     }
@@ -30,8 +30,8 @@ impl DrawnFeature {
     }
 }
 
-/// A feature of a file as a shape: kind, place, axis and sizes with their uncertainties; `None`
-/// without a place.
+/// Shape of a file's feature: kind, place, axis and sizes with their uncertainties; `None` without
+/// a place.
 pub(super) fn shape_of(record: &FeatureRecord) -> Option<Feature> {
     let std = |name: &str, unit: f64| record.std.get(name).map(|std| std * unit);
     let size = |value: Option<f64>, name: &str| Some(measured(value? * 1e-3, std(name, 1e-3)));

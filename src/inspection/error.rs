@@ -1,4 +1,4 @@
-//! What can be wrong with an inspection.
+//! Errors of an inspection.
 
 use std::io;
 use std::path::PathBuf;
@@ -12,13 +12,13 @@ use crate::io::touches_file::TouchesFileError;
 use crate::scan::ScanError;
 use crate::scene::SceneError;
 
-/// Why a part is not inspected.
+/// Reason for a failed inspection.
 #[derive(Debug, thiserror::Error)]
 pub enum InspectionError {
-    /// A setting that cannot be, by its flag.
+    /// An impossible setting, by its flag.
     #[error("{0}")]
     Setting(String),
-    /// A folder without anything that was measured.
+    /// A folder without measured features.
     #[error(
         "{} has no features.json: refine --features-out, features --out and probe write one; a session has it once it was saved",
         .0.display()
@@ -29,39 +29,39 @@ pub enum InspectionError {
         "a CAD mesh has no tolerances: name a general one by --general iso2768-m or --tolerance-mm"
     )]
     NoTolerance,
-    /// The system did not read a file.
+    /// The system failed to read a file.
     #[error("{}: {source}", path.display())]
     File {
         /// the file
         path: PathBuf,
-        /// what the system reports
+        /// error of the system
         source: io::Error,
     },
-    /// The file of a probing is none.
+    /// The file is no probing file.
     #[error("{}: {source}", path.display())]
     Probed {
         /// the file
         path: PathBuf,
-        /// why, with line and column
+        /// cause, with line and column
         source: serde_json::Error,
     },
-    /// Features are read from a file that is none.
+    /// The file is no features file.
     #[error(transparent)]
     Features(#[from] FeaturesFileError),
-    /// Touches are read from a file that is none.
+    /// The file is no touches file.
     #[error(transparent)]
     Touches(#[from] TouchesFileError),
-    /// Touches and features that are not of one measurement.
+    /// Touches and features come from different measurements.
     #[error("{} has {count} touches and the features name touch {named}: it is of another measurement", path.display())]
     OtherTouches {
-        /// the touches
+        /// touches file
         path: PathBuf,
-        /// how many there are
+        /// number of touches
         count: usize,
         /// number of the last touch that a feature names, from 0 on
         named: usize,
     },
-    /// Nominal values are read from a file that is none.
+    /// The file is no file of nominal values.
     #[error(transparent)]
     Nominal(#[from] NominalFileError),
     /// The drawing lacks something.
@@ -69,25 +69,25 @@ pub enum InspectionError {
     Drawing {
         /// the file
         path: PathBuf,
-        /// what, and what to do
+        /// cause and remedy
         why: String,
     },
-    /// The CAD mesh of the drawing cannot be read.
+    /// The CAD mesh of the drawing is unreadable.
     #[error("{}", .0.to_string().replace("--mesh-unit", "--nominal-unit"))]
     DrawingMesh(#[source] ScanError),
-    /// Drawing and part are not brought into one frame.
+    /// The alignment of drawing and part failed.
     #[error(transparent)]
     Alignment(#[from] AlignmentError),
-    /// The mesh of the picture cannot be read.
+    /// The mesh of the picture is unreadable.
     #[error(transparent)]
     Mesh(#[from] ScanError),
-    /// … or what is known of its vertices.
+    /// The vertex data of the picture's mesh is unreadable.
     #[error(transparent)]
     Columns(#[from] MeshFileError),
-    /// The scene that was touched with is none.
+    /// The scene file is invalid.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// A file of the report cannot be written.
+    /// A file of the report could not be written.
     #[error(transparent)]
     NotWritten(#[from] FileError),
 }

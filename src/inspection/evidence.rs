@@ -1,4 +1,4 @@
-//! The touches behind a characteristic: how far each is off the ideal surface.
+//! The touches behind a characteristic: distance of each from the ideal surface.
 
 use std::f64::consts::PI;
 
@@ -9,31 +9,31 @@ use crate::io::features_file::FeatureRecord;
 use crate::io::probed_touches_file::TouchLine;
 use crate::stylus::ProbedPoint;
 
-/// Most touches that a plot draws: evenly chosen of more.
+/// Most touches in a plot; a larger number is thinned evenly.
 const MOST_DRAWN: usize = 300;
 
-/// Cosine of 45°: a normal nearer to the axis is that of a floor, another one that of a wall.
+/// Cosine of 45°: a normal nearer to the axis belongs to a floor, any other to a wall.
 const HALF_WAY: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
 /// Touches on a surface.
 pub(super) struct TouchEvidence {
-    /// what the distances are from
+    /// reference of the distances
     pub ideal: &'static str,
-    /// what the touches are arranged by
+    /// coordinate that orders the touches
     pub along: &'static str,
-    /// of the touches that are drawn: along, and off the ideal surface, mm
+    /// plotted touches: coordinate, and distance from the ideal surface in mm
     pub drawn: Vec<[f64; 2]>,
     pub count: usize,
     /// root mean square of all distances, mm
     pub rms_mm: f64,
     /// largest distance, mm
     pub largest_mm: f64,
-    /// noise of a single touch as the measurement states it, root mean square, mm
+    /// stated noise of a single touch, root mean square, mm
     pub stated_mm: f64,
 }
 
-/// How far the touches behind a quantity are off the surface that was fitted to them; `None` where
-/// that surface is not in the file.
+/// Distances of the touches behind a quantity from their fitted surface; `None` if the file lacks
+/// that surface.
 #[expect(clippy::too_many_lines)]
 pub(super) fn touch_evidence(
     quantity: InspectedQuantity,
@@ -47,8 +47,8 @@ pub(super) fn touch_evidence(
     let mut all: Vec<&ProbedPoint> = numbers
         .map(|number| touches.get(number as usize))
         .collect::<Option<_>>()?;
-    // of the touches behind a number those on its own surface: walls lie along the axis, floors and
-    // planes across it
+    // keeps the touches on the quantity's own surface: walls lie along the axis, floors and planes
+    // across it
     let is_flat = quantity == InspectedQuantity::Depth || feature.kind == "plane";
     all.retain(|touch| (touch.normal.dot(&axis).abs() > HALF_WAY) == is_flat);
     if all.is_empty() {
@@ -143,7 +143,7 @@ pub(super) fn touch_evidence(
     })
 }
 
-/// Of each point the distance along the axis from the plane of least squares through those of its
+/// Distance of each point along the axis from the least-squares plane through the points of its
 /// end, mm.
 ///
 /// - `level`: height of the other end along the axis.
@@ -157,7 +157,7 @@ fn off_two_planes(seats: &[Vector3<f64>], axis: &Vector3<f64>, level: f64) -> Ve
             normal += row(seat) * row(seat).transpose();
             right += row(seat) * seat.dot(axis);
         }
-        // fewer than three points, or those of a line, have their mean height
+        // fewer than three points, or collinear ones, have their mean height
         let mean = Vector3::new(right.x / normal.m11.max(1.0), 0.0, 0.0);
         normal
             .cholesky()
@@ -181,7 +181,7 @@ fn across(axis: &Vector3<f64>) -> [Vector3<f64>; 2] {
     [u, axis.cross(&u)]
 }
 
-/// The touches of an arm among which those behind a characteristic were recorded.
+/// Touches of an arm whose time spans hold the recorded touches behind a characteristic.
 pub(super) fn probed_behind<'a>(
     probed: &'a [TouchLine],
     runs: &[[u32; 2]],
@@ -203,7 +203,7 @@ pub(super) fn probed_behind<'a>(
     probed.iter().filter(is_behind).collect()
 }
 
-/// Turns that touches leave out of a round wall, degrees: the widest gap.
+/// Widest gap between touches around a round wall, degrees.
 pub(super) fn widest_gap_deg(angles_deg: &[[f64; 2]]) -> f64 {
     let mut angles: Vec<f64> = angles_deg
         .iter()

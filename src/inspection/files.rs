@@ -13,26 +13,26 @@ use crate::io::inspection_file::write_inspection_table;
 use crate::io::qif_file::write_qif;
 use crate::io::session_folder::write_text_file;
 
-/// Places of the files of a report; `None`: it is not written.
+/// Paths of the report's files; `None`: not written.
 #[derive(Clone, Debug, Default)]
 pub struct ReportFiles {
-    /// one file that prints
+    /// one printable file
     pub html: Option<PathBuf>,
     /// the characteristics as a table
     pub csv: Option<PathBuf>,
-    /// all of it, as one object
+    /// the whole report, as one object
     pub json: Option<PathBuf>,
     /// QIF 3.0
     pub qif: Option<PathBuf>,
 }
 
-/// A report whole, as the page makes it.
+/// A whole report, as the page makes it.
 #[cfg(feature = "web")]
 impl ReportFiles {
-    /// Names of all of them in the folder of a session: HTML, CSV, JSON, QIF.
+    /// File names in the folder of a session: HTML, CSV, JSON, QIF.
     pub const NAMES: [&str; 4] = ["report.html", "results.csv", "results.json", "results.qif"];
 
-    /// All of them in a folder.
+    /// All files in a folder.
     pub fn in_folder(folder: &Path) -> Self {
         let [html, csv, json, qif] = Self::NAMES.map(|name| Some(folder.join(name)));
         Self {
@@ -45,11 +45,10 @@ impl ReportFiles {
 }
 
 impl ReportFiles {
-    /// Writes each as a whole; nothing, unless the report could be made.
+    /// Writes each file as a whole; nothing, unless the report succeeds.
     ///
     /// # Errors
-    /// [`InspectionError`] of the mesh and the scene, which are read for it, and of files that
-    /// cannot be written.
+    /// [`InspectionError`] for an unreadable mesh or scene, and for unwritable files.
     pub fn write(
         &self,
         source: &InspectionSource,

@@ -1,4 +1,4 @@
-//! The measured value of a characteristic, out of a file of features.
+//! The measured value of a characteristic, from a features file.
 
 use nalgebra::{Point3, Vector3};
 
@@ -7,13 +7,13 @@ use crate::conformity::{MeasuredNumber, place_number};
 use crate::features::{FittedTo, InspectedQuantity, Kind, LEAST_TOUCHES, LEAST_TURN};
 use crate::io::features_file::{FeatureFile, FeatureRecord, RelationRecord};
 
-/// What a file says of a characteristic.
+/// Measurement of a characteristic in a file.
 #[derive(Default)]
 pub(super) struct CharacteristicMeasurement {
     pub number: Option<MeasuredNumber>,
-    /// why there is none
+    /// cause of a missing number
     pub why_none: Option<String>,
-    /// the touches behind it: runs of numbers
+    /// touches behind the number: runs of numbers
     pub runs: Vec<[u32; 2]>,
 }
 
@@ -26,12 +26,12 @@ impl CharacteristicMeasurement {
     }
 }
 
-/// Whether no touches are behind the numbers of a feature: nothing is decided on those.
+/// Whether no touches are behind a feature's numbers; these get no decision.
 pub(super) fn is_of_mesh(feature: &FeatureRecord) -> bool {
     feature.fitted_to == FittedTo::Mesh.name()
 }
 
-/// Which touches a feature of the mesh lacks for a quantity: how many and where.
+/// Touches that a feature of the mesh lacks for a quantity: number and places.
 pub(super) fn missing_touches(feature: &FeatureRecord, quantity: InspectedQuantity) -> String {
     let is_raised = matches!(&*feature.kind, "boss" | "cylinder");
     let is_slot = matches!(&*feature.kind, "slot" | "pocket");
@@ -49,7 +49,7 @@ pub(super) fn missing_touches(feature: &FeatureRecord, quantity: InspectedQuanti
         (_, "corner") => (3, ", a third on each of its planes"),
         _ => (1, ", spread over it"),
     };
-    // walls lie below an opening and above a foot, the place of which is known
+    // walls lie below an opening and above a foot, whose place is known
     let depth = feature.depth_mm.unwrap_or(0.0) * if is_raised { 0.5 } else { -0.5 };
     let place = feature.center_mm.map(|mm| {
         let axis = feature.axis.map_or_else(Vector3::zeros, Vector3::from);
@@ -70,7 +70,7 @@ pub(super) fn missing_touches(feature: &FeatureRecord, quantity: InspectedQuanti
 }
 
 /// - `nominal_mm`: centre of the feature in the drawing.
-/// - `datum`: the feature that the quantity relates to.
+/// - `datum`: reference feature of the quantity.
 pub(super) fn measurement(
     file: &FeatureFile,
     feature: &FeatureRecord,
@@ -119,7 +119,7 @@ pub(super) fn measurement(
     }
 }
 
-/// The number of a feature whose touches are those on its surface.
+/// The number whose touches lie on the feature's surface.
 pub(super) fn surface(feature: &FeatureRecord) -> &'static str {
     let walls = ["diameter_mm", "width_mm"];
     walls
@@ -147,7 +147,7 @@ fn related(
             .filter_map(|relation| Some((relation, relation.number(quantity)?)))
             .next()
     };
-    // between two axes the distance and the angle are the same from either
+    // distance and angle between two axes are symmetric
     let is_same_from_either = |relation: &RelationRecord| match quantity {
         InspectedQuantity::Angle => true,
         InspectedQuantity::Distance => relation.kind == "distance",

@@ -1,9 +1,9 @@
 //! Measured features against a drawing: each characteristic with its decision, and the report of
 //! all of them as HTML, CSV, JSON and QIF.
 //!
-//! What was measured ([`InspectionSource`]) and what the part should be ([`PartDrawing`]) give the
-//! characteristics ([`inspected`]); the decisions themselves are those of [`crate::conformity`].
-//! Command line and operator's page make the same report of the same files.
+//! Measurement ([`InspectionSource`]) and nominal part ([`PartDrawing`]) give the characteristics
+//! ([`inspected`]); [`crate::conformity`] decides. Command line and operator page make the same
+//! report from the same files.
 
 mod alignment;
 mod calibration;

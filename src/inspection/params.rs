@@ -1,4 +1,4 @@
-//! How a part is inspected, and what the report says of who asked.
+//! Settings of an inspection, and the report's administrative data.
 
 use nalgebra::Vector3;
 
@@ -11,31 +11,31 @@ use crate::io::mesh_file::MeshUnit;
 /// Settings of an inspection.
 #[derive(Clone, Debug)]
 pub struct InspectionParams {
-    /// what is added to the nominal values
+    /// additions to the nominal values
     pub drawing: DrawingParams,
-    /// how it is decided
+    /// decision rule
     pub decision: DecisionParams,
-    /// k of the expanded uncertainties U = k u. Default 2: about 95 %, as certificates have it.
+    /// k of the expanded uncertainties U = k u. Default 2: about 95 %, as on certificates.
     pub coverage_factor: f64,
-    /// A feature is the nominal one where its centre is no farther off than this across its axis,
-    /// mm. Default 1.5: less than what separates neighbours on most parts.
+    /// Largest distance of a feature's centre from its nominal place, across the axis, mm. Default
+    /// 1.5: less than the distance between neighbours on most parts.
     pub match_mm: f64,
-    /// how the frame of the drawing is found on the part; `None`: it is that of the mesh
+    /// alignment with the drawing; `None`: the drawing frame is the mesh frame
     pub align: Option<AlignmentMethod>,
     /// name or number of the part
     pub part: Option<String>,
-    /// of this one part
+    /// serial number of this part
     pub serial: Option<String>,
-    /// who inspects
+    /// name of the inspector
     pub operator: Option<String>,
 }
 
-/// How the part is drawn in the report.
+/// Settings of the part's picture in the report.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct PartPicture {
-    /// of the coordinates in the file of its mesh
+    /// unit of the coordinates in the mesh file
     pub mesh_unit: MeshUnit,
-    /// from which direction; `None`: from the side that was touched
+    /// direction of view; `None`: from the touched side
     pub view: Option<Vector3<f64>>,
 }
 
@@ -55,7 +55,7 @@ impl Default for InspectionParams {
 }
 
 impl InspectionParams {
-    /// Checks that each is possible; who refuses names the flag of the command line.
+    /// Checks each setting; an error names the flag of the command line.
     ///
     /// # Errors
     /// [`InspectionError::Setting`]
@@ -94,10 +94,10 @@ impl InspectionParams {
     }
 }
 
-/// The general tolerance of a name.
+/// General tolerance by name.
 ///
 /// # Errors
-/// In words: the names that there are.
+/// A text with the available names.
 pub fn general_tolerance(name: &str) -> Result<GeneralTolerance, String> {
     let class = GeneralTolerance::of_name(name);
     class.ok_or_else(|| {
@@ -108,7 +108,7 @@ pub fn general_tolerance(name: &str) -> Result<GeneralTolerance, String> {
     })
 }
 
-/// The decision rule of a name.
+/// Decision rule by name.
 ///
 /// # Errors
 /// As [`general_tolerance`].

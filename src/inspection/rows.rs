@@ -1,4 +1,4 @@
-//! From a drawing and what was measured to characteristics with their decisions.
+//! Characteristics with their decisions, from drawing and measurement.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::SystemTime;
@@ -27,27 +27,27 @@ use crate::io::nominal_file::NominalRecord;
 pub struct Balloon {
     /// from 1 on
     pub number: usize,
-    /// what it is
+    /// kind of feature
     pub kind: String,
-    /// where it is, else where it should be
+    /// measured place, else nominal place
     pub place_mm: Option<[f64; 3]>,
-    /// `id` of the feature that was found
+    /// `id` of the measured feature
     pub feature: Option<u32>,
-    /// its characteristics, places in the record
+    /// its characteristics, as indices into the record
     pub characteristics: Vec<usize>,
 }
 
-/// A whole inspection, as it is shown.
+/// A whole inspection, as shown.
 pub struct Inspected {
     pub record: InspectionRecord,
     pub balloons: Vec<Balloon>,
-    /// of each characteristic, the touches behind it: runs of numbers
+    /// touches behind each characteristic: runs of numbers
     pub runs: Vec<Vec<[u32; 2]>>,
-    /// of each characteristic
+    /// quantity of each characteristic
     pub quantities: Vec<InspectedQuantity>,
 }
 
-/// Inspects.
+/// Inspects the measurement against the drawing.
 ///
 /// # Errors
 /// [`InspectionError::Alignment`]
@@ -72,7 +72,7 @@ pub fn inspected(
     for (number, group) in (1..).zip(&groups) {
         let first = &drawn[group[0]].nominal;
         let matched = &found.features[number - 1];
-        // the picture is that of the mesh
+        // the picture shows the mesh
         let feature = found_feature(matched, &source.features);
         for (index, &at) in (1..).zip(group) {
             let place = format!("{number}.{index}");
@@ -122,7 +122,7 @@ fn in_mesh(mm: [f64; 3], alignment: &Option<Alignment>) -> Option<[f64; 3]> {
     )
 }
 
-/// Characteristics of the same feature of the drawing, in order of the first of each.
+/// Characteristics by feature of the drawing, in order of their first.
 fn groups_of(drawn: &[Drawn]) -> Vec<Vec<usize>> {
     let mut groups: Vec<Vec<usize>> = Vec::new();
     for (at, one) in drawn.iter().enumerate() {
@@ -137,9 +137,9 @@ fn groups_of(drawn: &[Drawn]) -> Vec<Vec<usize>> {
 }
 
 struct DrawingMatches {
-    /// of each group
+    /// match of each group
     features: Vec<FeatureMatch>,
-    /// of each characteristic, where it has a datum
+    /// datum of each characteristic, if any
     datums: Vec<Option<FeatureMatch>>,
 }
 
@@ -201,7 +201,7 @@ fn found_feature<'a>(matched: &FeatureMatch, file: &'a FeatureFile) -> Option<&'
     file.feature(*id)
 }
 
-/// Why a feature of the drawing has none that was measured.
+/// Cause of a missing measured feature.
 fn why_not(
     matched: &FeatureMatch,
     kind: &str,
@@ -367,7 +367,7 @@ fn characteristic(
     (record, measured.runs)
 }
 
-/// Kinds that a drawing would have a characteristic for.
+/// Kinds that usually have a characteristic in a drawing.
 const COUNTED: [&str; 6] = ["hole", "slot", "pocket", "boss", "cylinder", "notch"];
 
 fn record_of(

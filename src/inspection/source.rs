@@ -1,4 +1,4 @@
-//! The files that an inspection rests on.
+//! Input files of an inspection.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -14,25 +14,25 @@ use crate::io::session_folder::{fingerprint, read_text};
 use crate::io::touches_file::read_touches;
 use crate::stylus::ProbedPoint;
 
-/// What was measured, as its files have it.
+/// Measurement from its files.
 pub struct InspectionSource {
     pub features: FeatureFile,
     pub touches: Vec<ProbedPoint>,
-    /// of an arm
+    /// touches of an arm
     pub probed: Vec<TouchLine>,
-    /// the mesh of the picture
+    /// mesh of the picture
     pub mesh: Option<PathBuf>,
     pub scene: Option<PathBuf>,
-    /// all that were read
+    /// all files read
     pub files: Vec<InspectedFile>,
-    /// what has to be known of them
+    /// remarks for the reader
     pub notes: Vec<String>,
 }
 
 impl InspectionSource {
-    /// - `path`: a file of features, or a folder with one.
-    /// - `named`: touches, mesh and scene, where flags name them; else they are looked for beside
-    ///   the features.
+    /// - `path`: a features file, or a folder with one.
+    /// - `named`: touches, mesh and scene from flags; otherwise the folder of the features supplies
+    ///   them.
     pub fn read(path: &Path, named: [Option<&Path>; 3]) -> Result<Self, InspectionError> {
         if let Some(probed) = probed_file(path) {
             return Self::of_probing(&probed, named);
@@ -86,8 +86,8 @@ impl InspectionSource {
         })
     }
 
-    /// What an arm measured: the feature of each flag, by the number of the flag, and the touches
-    /// that it was measured by.
+    /// Measurement by an arm: one feature per flag, by the flag's number, and the touches behind
+    /// it.
     fn of_probing(
         path: &Path,
         [_, mesh, scene]: [Option<&Path>; 3],
@@ -147,15 +147,15 @@ fn not_read(path: &Path, source: io::Error) -> InspectionError {
     }
 }
 
-/// The features of a folder, and how the file of their touches is called: those of a session that
-/// was ended or refined, else those that `~/save_mesh` has saved of one that runs.
+/// Names of features and touches files in a folder: from a finished or refined session, else from
+/// `~/save_mesh` of a running session.
 const IN_FOLDER: [(&str, &str); 2] = [
     ("features.json", "touches.csv"),
     ("refined.features.json", "refined.touches.csv"),
 ];
 
-/// The file of features that `path` is, or that is in the folder `path`, and the name of the
-/// touches beside it.
+/// The features file that `path` names, or that its folder has, and the name of the touches file
+/// beside it.
 fn features_of(path: &Path) -> Result<(PathBuf, &'static str), InspectionError> {
     if !path.is_dir() {
         let is_saved = path.file_name().is_some_and(|name| name == IN_FOLDER[1].0);
@@ -166,7 +166,7 @@ fn features_of(path: &Path) -> Result<(PathBuf, &'static str), InspectionError> 
     found.ok_or_else(|| InspectionError::NoFeatures(path.to_owned()))
 }
 
-/// `probed.json` as far as an inspection needs it.
+/// The part of `probed.json` that an inspection needs.
 #[derive(Deserialize)]
 struct ProbedFeatures {
     features: Vec<ProbedFeature>,
@@ -183,14 +183,14 @@ struct ProbedFeature {
     ending: String,
     #[serde(default)]
     touches: usize,
-    /// older files do not say
+    /// absent in older files
     #[serde(default)]
     verified_touches: Option<usize>,
 }
 
 impl ProbedFeature {
-    /// What has to be known of it: what stopped the arm, and touches after which no contact was
-    /// found if it had been.
+    /// Remarks: cause of a stop of the arm, and touches in doubt, after which contact was missing
+    /// at a place that had it.
     fn notes(&self) -> Vec<String> {
         let Self { flag, ending, .. } = self;
         let stopped = (self.code == "stopped").then(|| format!("Feature {flag}: {ending}."));
@@ -205,7 +205,7 @@ impl ProbedFeature {
     }
 }
 
-/// The features of a file of a probing.
+/// Features of a probing file.
 fn probed_features(path: &Path) -> Result<Vec<ProbedFeature>, InspectionError> {
     let text = read_text(path).map_err(|error| not_read(path, error))?;
     let file: ProbedFeatures =
@@ -216,8 +216,7 @@ fn probed_features(path: &Path) -> Result<Vec<ProbedFeature>, InspectionError> {
     Ok(file.features)
 }
 
-/// The file of a probing: it has the features that were flagged, also where few touches leave none
-/// in features.json.
+/// Probing file: it has the flagged features, even if few touches leave none in features.json.
 fn probed_file(path: &Path) -> Option<PathBuf> {
     let probed = if path.is_dir() {
         path.join("probed.json")
@@ -227,7 +226,7 @@ fn probed_file(path: &Path) -> Option<PathBuf> {
     (probed.file_name()? == "probed.json" && probed.is_file()).then_some(probed)
 }
 
-/// A touch of an arm; the ball meets the part in the direction of its search.
+/// A touch of an arm; the ball meets the part in the search direction.
 fn point_of(touch: &TouchLine) -> ProbedPoint {
     let normal = -Vector3::from(touch.approach);
     let centre = Point3::from(touch.centre_mm.unwrap_or(touch.from_mm)) * 1e-3;
@@ -247,8 +246,8 @@ fn point_of(touch: &TouchLine) -> ProbedPoint {
     }
 }
 
-/// A feature by another number, and its touches counted from `offset` on: those of a flag are
-/// numbered from 1 on.
+/// A feature with another number, and its touches counted from `offset`; a flag numbers its touches
+/// from 1.
 fn renumbered(mut feature: FeatureRecord, id: u32, offset: u32) -> FeatureRecord {
     feature.id = id;
     let of_all = |number: &mut u32| *number = (*number + offset).saturating_sub(1);
@@ -275,7 +274,7 @@ pub(super) fn inspected_file(role: &str, path: &Path) -> Result<InspectedFile, I
     })
 }
 
-/// Features name touches by number: a file of other touches is found where it is too short.
+/// Checks touch numbers of features: a file of other touches shows if it is too short.
 fn check_touches(
     features: &FeatureFile,
     touches: &[ProbedPoint],
@@ -305,7 +304,7 @@ fn check_touches(
 mod tests {
     use super::*;
 
-    /// A feature of the mesh, and no touches.
+    /// A mesh feature without touches.
     fn write(folder: &Path, features: &str, touches: &str) {
         let text =
             r#"{"features": [{"id": 1, "kind": "hole", "diameter_mm": 8.0, "fitted_to": "mesh"}]}"#;

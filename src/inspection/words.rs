@@ -1,6 +1,6 @@
-//! Words that the summary and the report have in common.
+//! Words common to summary and report.
 
-/// A share in percent, with the digits that it has.
+/// A share in percent, without digits of rounding noise.
 pub fn percent(share: f64) -> f64 {
     (share * 1e6).round() / 1e4
 }
@@ -8,7 +8,7 @@ pub fn percent(share: f64) -> f64 {
 /// Most names in a line.
 const MOST_NAMED: usize = 8;
 
-/// The first names, and how many more there are.
+/// First names, and the number of further ones.
 pub fn first_few(names: &[String], between: &str) -> String {
     let shown = names
         .iter()

@@ -1,64 +1,64 @@
-//! Why drawing and part are not brought into one frame.
+//! Errors of the alignment between drawing and part.
 
 use crate::align::{DatumFitError, FeaturesError};
 
-/// What is wrong, and what to do.
+/// Error and remedy.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum AlignmentError {
-    /// The drawing has nothing to align by.
+    /// The drawing states no feature place.
     #[error(
         "the drawing says of no feature where it is: fill in center_x_mm, center_y_mm, center_z_mm and axis_x, axis_y, axis_z"
     )]
     NoPlaces,
-    /// A datum that the drawing does not have.
+    /// The drawing lacks this datum.
     #[error("--align: the drawing has no characteristic {name:?} for a datum: it has {known}")]
     NoSuchDatum {
-        /// as it was given
+        /// name as given
         name: String,
-        /// what there is
+        /// available names
         known: String,
     },
-    /// A datum, or all features, that cannot be used.
+    /// Unusable datum, or no usable feature at all.
     #[error("--align: datum {name:?} cannot be used: {why}")]
     BadDatum {
-        /// as it was given
+        /// name as given
         name: String,
-        /// and what to do
+        /// cause and remedy
         why: String,
     },
-    /// The features do not say how the drawing lies on the part.
+    /// The features do not determine the pose of the drawing on the part.
     #[error("--align: {}", in_words(.0))]
     NotFound(FeaturesError),
-    /// Named features that fit in several ways, or in none.
+    /// The named features fit in several ways, or in none.
     #[error("--align: the features that the drawing names by their ids fit it in {} way: {}",
         if *.count == 0 { "no" } else { "more than one" },
         if *.count == 0 { "check the ids, and nominal places and axes" } else { "name one more, which breaks the symmetry" })]
     Named {
-        /// how many ways were found
+        /// number of ways
         count: usize,
     },
-    /// They leave freedoms open.
+    /// The features leave degrees of freedom open.
     #[error(
         "--align: {error} by {used}: give axis_x, axis_y, axis_z of nominal features, touch more features that the drawing has, or name \
          another datum"
     )]
     Open {
-        /// which
+        /// open freedoms
         error: DatumFitError,
-        /// the features that were used
+        /// features in use
         used: String,
     },
-    /// A feature is far off after all.
+    /// A feature stays far off its nominal place.
     #[error(
         "--align: {name} is {residual_mm:.3} mm off its nominal place after the alignment, more than {limit_mm} mm (--match-mm): check the \
          drawing and which feature it is, name it in the column feature, or align by datums"
     )]
     Residual {
-        /// of the feature in the drawing
+        /// name in the drawing
         name: String,
-        /// across its axis, of a plane along its normal
+        /// residual across the axis; for a plane along its normal
         residual_mm: f64,
-        /// what is allowed
+        /// allowed residual
         limit_mm: f64,
     },
 }

@@ -1,12 +1,12 @@
-//! How the frame of the drawing is found on the part.
+//! Method that finds the drawing frame on the part.
 
 use std::fmt;
 use std::str::FromStr;
 
-/// What takes the measured features into the frame of the drawing.
+/// Basis of the motion from measured features to the drawing frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum AlignmentMethod {
-    /// All features that both have, by least squares.
+    /// Least squares over all common features.
     BestFit,
     /// Datums in their order, each by the name of a characteristic of its feature.
     Datums(Vec<String>),

@@ -1,5 +1,5 @@
-//! The measured features in the frame of the drawing: the rigid motion that takes the part there,
-//! by a best fit or by datums, and what it adds to the uncertainty of places.
+//! Measured features in the drawing frame: the rigid motion of the part into that frame, by best
+//! fit or datums, and its share of the uncertainty of places.
 
 mod error;
 mod method;
@@ -17,24 +17,24 @@ use crate::features::{Feature, FittedTo};
 use crate::io::features_file::{FeatureFile, FeatureRecord};
 use crate::io::inspection_file::{AlignedFeatureRecord, AlignmentRecord};
 
-/// Rounds of matching and fitting: what a better fit matches changes little.
+/// Rounds of matching and fitting; later rounds hardly change the matches.
 const MOST_ROUNDS: usize = 4;
-/// Names that are listed in an error at most.
+/// Most names in an error.
 const MOST_NAMED: usize = 12;
 
-/// What was measured, in the frame of the drawing.
+/// Measurement in the drawing frame.
 pub struct Alignment {
-    /// places and axes moved, their uncertainties about the frame of the drawing
+    /// places and axes moved; their uncertainties relate to the drawing frame
     pub features: FeatureFile,
-    /// takes O into the frame of the drawing
+    /// takes O into the drawing frame
     pub motion: Isometry3<f64>,
-    /// for the report
+    /// record for the report
     pub record: AlignmentRecord,
-    /// features of the drawing that were not used, by name
+    /// unused features of the drawing, by name
     pub unused: Vec<String>,
 }
 
-/// A feature of the drawing, by its number, and the measured one that it is.
+/// A feature of the drawing, by its number, and its measured counterpart.
 #[derive(Clone, PartialEq)]
 struct Matched {
     drawn: usize,
@@ -42,9 +42,9 @@ struct Matched {
     id: u32,
 }
 
-/// Aligns.
+/// Aligns the measured features with the drawing.
 ///
-/// - `match_mm`: how far a feature may be off its nominal place.
+/// - `match_mm`: largest distance of a feature from its nominal place.
 ///
 /// # Errors
 /// [`AlignmentError`]
@@ -113,8 +113,8 @@ pub fn aligned(
     })
 }
 
-/// From where the search begins: by the features that the drawing names, where all that are to be
-/// used are named, else by the pattern of all.
+/// Start of the search: from the features that the drawing names if it names all features in use,
+/// else from the pattern of all features.
 fn start(
     drawn: &[DrawnFeature],
     measured: &[Feature],
@@ -145,8 +145,8 @@ fn start(
     })
 }
 
-/// Each feature of the drawing with the measured one that it is after a motion, or why none can be
-/// used.
+/// Pairs each drawing feature with its measured counterpart after a motion, or says why it has
+/// none.
 fn matched(
     drawn: &[DrawnFeature],
     measured: &[Feature],
@@ -183,7 +183,7 @@ fn matched(
     each.collect()
 }
 
-/// Both as a pair, where their places can be compared.
+/// Both as a pair, if their places are comparable.
 fn paired(drawn: usize, one: &DrawnFeature, feature: &Feature) -> Result<Matched, String> {
     let id = feature.id;
     if !is_aligned_by(one.shape.kind) {
@@ -293,7 +293,7 @@ fn first_names(names: &[String]) -> String {
     }
 }
 
-/// All that was measured, in the frame of the drawing.
+/// The whole measurement in the drawing frame.
 fn moved(
     file: &FeatureFile,
     measured: &[Feature],
@@ -314,7 +314,7 @@ fn moved(
     file
 }
 
-/// Standard uncertainty of a centre about the frame of the drawing, m.
+/// Standard uncertainty of a centre relative to the drawing frame, m.
 fn place_std(feature: &Feature, used: &[Matched], fit: &DatumFit) -> Option<f64> {
     if let Some(at) = used.iter().position(|one| one.id == feature.id) {
         return Some(fit.place_stds[at]);

@@ -1,4 +1,4 @@
-//! Where the part lies about the drawing, roughly: from any place and turn.
+//! Coarse pose of the part relative to the drawing, from any initial pose.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -9,12 +9,12 @@ use crate::align::{DatumFit, DatumPair, FeaturesParams, align_features, fit_datu
 use crate::features::{Feature, Kind};
 use crate::inspection::drawn_feature::DrawnFeature;
 
-/// Two motions are one where they turn by no more than this apart, rad.
+/// Two motions are equal if their rotations differ by at most this angle, rad.
 const SAME_TURN: f64 = 0.05;
 /// Cosine of the largest angle between a measured axis and its nominal one: 10°.
 const ALONG: f64 = 0.985;
 
-/// The kinds that have an axis by which they are aligned.
+/// Kinds whose axis serves the alignment.
 pub(super) fn is_aligned_by(kind: Kind) -> bool {
     matches!(
         kind,
@@ -22,7 +22,7 @@ pub(super) fn is_aligned_by(kind: Kind) -> bool {
     )
 }
 
-/// By the pattern of all features: the motion that takes the measured ones onto the drawing.
+/// Motion of the measured features onto the drawing, from the pattern of all features.
 ///
 /// # Errors
 /// [`AlignmentError::NotFound`]
@@ -43,13 +43,13 @@ pub(super) fn start_of_pattern(
         .map_err(AlignmentError::NotFound)
 }
 
-/// By features that the drawing names: from every turn by quarters the fit is tried, and what fits
-/// is taken.
+/// Motion from features that the drawing names: tries the fit from all quarter turns and takes the
+/// one solution.
 ///
-/// - `reach`: how far a feature may be off, m.
+/// - `reach`: largest distance of a feature from its nominal place, m.
 ///
 /// # Errors
-/// [`AlignmentError::Named`], and what [`fit_datums`] says.
+/// [`AlignmentError::Named`], and errors of [`fit_datums`].
 pub(super) fn start_of_named(
     pairs: &[DatumPair],
     reach: f64,
@@ -83,7 +83,7 @@ pub(super) fn start_of_named(
     }
 }
 
-/// Whether axes lie as the drawing has them, and planes face where they do there.
+/// Whether axes and plane normals agree with the drawing.
 fn keeps_axes(pairs: &[DatumPair], fit: &DatumFit) -> bool {
     let is_kept = |pair: &DatumPair| {
         let cosine = pair
@@ -100,7 +100,7 @@ fn keeps_axes(pairs: &[DatumPair], fit: &DatumFit) -> bool {
     pairs.iter().all(is_kept)
 }
 
-/// A turn about the middle of what was measured, which comes over that of the drawing.
+/// A turn about the middle of the measured places, moved onto the middle of the nominal ones.
 fn over_one_another(pairs: &[DatumPair], turn: UnitQuaternion<f64>) -> Isometry3<f64> {
     let middle = |place: fn(&DatumPair) -> Point3<f64>| {
         pairs
@@ -113,7 +113,7 @@ fn over_one_another(pairs: &[DatumPair], turn: UnitQuaternion<f64>) -> Isometry3
     Isometry3::from_parts(Translation3::from(to - turn * from), turn)
 }
 
-/// The 24 turns of a cube.
+/// The 24 rotations of a cube.
 fn quarter_turns() -> Vec<UnitQuaternion<f64>> {
     let about = |axis: Vector3<f64>, quarters: u32| {
         UnitQuaternion::from_scaled_axis(axis * (FRAC_PI_2 * f64::from(quarters)))

@@ -8,18 +8,18 @@ use crate::features::InspectedQuantity;
 use crate::inspection::rows::Inspected;
 use crate::io::inspection_file::CharacteristicRecord;
 
-/// How a decision looks.
+/// Look of a decision.
 pub(super) struct DecisionLook {
-    /// of its field
+    /// colour of the field
     pub fill: &'static str,
-    /// of its letters
+    /// colour of the letters
     pub ink: &'static str,
-    /// beside its word
+    /// sign beside the word
     pub sign: &'static str,
 }
 
-/// Bluish green, vermillion and yellow: told apart without red or green as well, and each has its
-/// sign and its word.
+/// Bluish green, vermillion and yellow: distinct without red or green vision too, each with its
+/// sign and word.
 pub(super) fn look_of(decision: &str) -> DecisionLook {
     match decision {
         "pass" => DecisionLook {
@@ -40,12 +40,12 @@ pub(super) fn look_of(decision: &str) -> DecisionLook {
     }
 }
 
-/// A number with the digits that a drawing has; none: a dash.
+/// A number with a drawing's digits; a dash for none.
 pub(super) fn shown(number: Option<f64>) -> String {
     number.map_or_else(|| "–".to_owned(), |number| fixed(number, 3))
 }
 
-/// A probability in percent, as far as it is not certain.
+/// A probability in percent, bounded near certainty.
 pub(super) fn probability(share: f64) -> String {
     match share * 100.0 {
         percent if percent > 99.9 => "> 99.9 %".to_owned(),
@@ -139,7 +139,7 @@ mod tests {
     use crate::colour_vision::least_difference;
     use crate::conformity::Decision;
 
-    /// 10 is a difference that nobody overlooks side by side.
+    /// A difference of 10 is evident side by side.
     #[test]
     fn decisions_are_told_apart_by_who_lacks_a_cone() {
         let byte = |hex: &str, at: usize| u8::from_str_radix(&hex[at..at + 2], 16).unwrap();

@@ -1,5 +1,4 @@
-//! The report: one file of HTML without scripts, which asks for nothing outside of it and prints on
-//! A4.
+//! The report: one HTML file without scripts or external resources, printable on A4.
 
 mod alignment;
 mod decisions;

@@ -19,16 +19,16 @@ use crate::io::mesh_file::read_vertex_columns;
 use crate::io::png::png_bytes;
 use crate::scan::{Scan, read_scan};
 
-/// Of the part without what is around it, pixels.
+/// Width of the part without margin, pixels.
 const WIDTH: u32 = 1100;
-/// Around it, for balloons.
+/// Margin for balloons.
 const MARGIN: f64 = 70.0;
-/// Of a balloon.
+/// Radius of a balloon.
 const RADIUS: f64 = 21.0;
 const TOUCHED: Rgb = [150, 184, 214];
 const SCANNED: Rgb = [205, 208, 213];
 
-/// The section; says so without a mesh.
+/// The section; without a mesh a note.
 pub(super) fn picture(input: &ReportInput<'_>) -> Result<Markup, InspectionError> {
     let Some(path) = &input.source.mesh else {
         return Ok(html! {
@@ -109,7 +109,7 @@ fn part_view(
     Ok(draw_part(&panel, &params, places))
 }
 
-/// The worst decision of a feature.
+/// Worst decision of a feature.
 fn worst<'a>(input: &ReportInput<'a>, balloon: &Balloon) -> &'a str {
     let rank = |name: &&str| {
         Decision::ALL
@@ -138,15 +138,14 @@ fn draw_balloon(balloon: &Balloon, decision: &str, place: [f64; 2], seat: [f64; 
     }
 }
 
-/// Points of the outline on which balloons stand.
+/// Number of outline points as candidate balloon places.
 const OUTLINE_POINTS: usize = 720;
-/// Balloons are so far apart along it, in radii, where there is room.
+/// Desired distance between balloons along the outline, in radii.
 const APART: f64 = 2.8;
 
-/// Places of the balloons around the part, each in the direction of its feature, apart from one
-/// another.
+/// Balloon places around the part, each in the direction of its feature, spaced apart.
 ///
-/// - `size`: of the picture, pixels.
+/// - `size`: size of the picture, pixels.
 fn balloon_seats(places: &[[f64; 2]], [width, height]: [f64; 2]) -> Vec<[f64; 2]> {
     let middle = [width / 2.0 + MARGIN, height / 2.0 + MARGIN];
     let half = [
@@ -157,7 +156,7 @@ fn balloon_seats(places: &[[f64; 2]], [width, height]: [f64; 2]) -> Vec<[f64; 2]
     let outline: Vec<_> = (0..=OUTLINE_POINTS)
         .map(|point| on_rectangle(angle_of(point as f64), half, middle))
         .collect();
-    // from the first point along the outline to each
+    // arc length from the first point to each
     let mut along = vec![0.0];
     for (one, next) in outline.iter().zip(&outline[1..]) {
         along.push(along[along.len() - 1] + (next[0] - one[0]).hypot(next[1] - one[1]));
@@ -187,15 +186,15 @@ fn balloon_seats(places: &[[f64; 2]], [width, height]: [f64; 2]) -> Vec<[f64; 2]
     placed
 }
 
-/// The places along a closed line of this length that are nearest to the wanted ones by least
-/// squares, and this far apart, or all around where there is no room for that.
+/// Places along a closed line of this length, nearest to the wanted ones by least squares, at this
+/// distance apart, or evenly around if the line is too short.
 ///
-/// - `wanted`: ascending. Less what the others before each need, they are to be ascending too: by
-///   pooling those that are not \[Barlow et al. 1972\].
+/// - `wanted`: ascending. Less the length that earlier places need, they have to ascend too:
+///   pooling merges violators \[Barlow et al. 1972\].
 fn spread(wanted: &[f64], length: f64, apart: f64) -> Vec<f64> {
     let count = wanted.len();
     let apart = apart.min(length / count.max(1) as f64);
-    // mean of each pool, and how many are in it
+    // mean and size of each pool
     let mut pools: Vec<(f64, usize)> = Vec::new();
     for (at, place) in wanted.iter().enumerate() {
         pools.push((place - at as f64 * apart, 1));
@@ -220,7 +219,7 @@ fn spread(wanted: &[f64], length: f64, apart: f64) -> Vec<f64> {
         .zip(placed.first())
         .map_or(0.0, |(last, first)| last - first);
     let (first, step) = match placed.first() {
-        // the last would stand on the first
+        // the last would overlap the first
         Some(first) if reach > length - apart => (*first, Some(length / count as f64)),
         Some(first) => (*first, None),
         None => (0.0, None),
@@ -232,7 +231,7 @@ fn spread(wanted: &[f64], length: f64, apart: f64) -> Vec<f64> {
     placed.into_iter().enumerate().map(place).collect()
 }
 
-/// Where a ray from the middle leaves a rectangle, the corners cut.
+/// Point at which a ray from the middle leaves a rectangle with cut corners.
 fn on_rectangle(angle: f64, [a, b]: [f64; 2], [x, y]: [f64; 2]) -> [f64; 2] {
     let (sine, cosine) = angle.sin_cos();
     // a superellipse: nearly a rectangle, and smooth
@@ -273,9 +272,9 @@ mod tests {
         assert_eq!(spread(&[10.0, 50.0], 100.0, 10.0), [10.0, 50.0]);
         // three at one place: the middle one stays
         assert_eq!(spread(&[50.0, 50.0, 50.0], 100.0, 10.0), [40.0, 50.0, 60.0]);
-        // around the beginning of the line
+        // across the beginning of the line
         assert_eq!(spread(&[2.0, 2.0, 2.0], 100.0, 10.0), [92.0, 2.0, 12.0]);
-        // no room: all around
+        // no room: evenly around
         assert_eq!(spread(&[0.0, 1.0, 2.0, 3.0], 20.0, 10.0).len(), 4);
         let mut around = spread(&[0.0, 1.0, 2.0, 3.0], 20.0, 10.0);
         around.sort_by(f64::total_cmp);

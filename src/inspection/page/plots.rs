@@ -1,4 +1,4 @@
-//! Charts of touches: how far each is off, and the force of an arm.
+//! Charts of touches: their residuals, and the force of an arm.
 
 use maud::Markup;
 use touchup_page::figure::{Axis, Figure, LineStroke, Mark, Series, Spread};
@@ -16,7 +16,7 @@ fn chart(title: &str, [x, y]: [Axis; 2], series: impl IntoIterator<Item = Series
     figure.svg(&Looks::default(), ChartSize::SMALL, "")
 }
 
-/// How far the touches are off the ideal surface, µm.
+/// Distance of the touches from the ideal surface, µm.
 pub(super) fn residual_plot(evidence: &TouchEvidence) -> Markup {
     let offs = evidence.drawn.iter().map(|[_, off]| (off * 1e3).abs());
     let most = offs.fold(2e3 * evidence.stated_mm, f64::max).max(1.0);
@@ -44,10 +44,10 @@ pub(super) fn residual_plot(evidence: &TouchEvidence) -> Markup {
     chart("touches off the fitted surface", axes, series)
 }
 
-/// Force against the approach over the travel, of accepted touches; `None` without a curve.
+/// Force along the approach against travel, for accepted touches; `None` without a curve.
 pub(super) fn force_plot(touches: &[&TouchLine]) -> Option<Markup> {
     let is_drawn = |touch: &&&TouchLine| touch.accepted && touch.curve.len() > 1;
-    // counted from where the force is largest: contact lies there for all
+    // zero at the deepest travel: all touches are in contact there
     let curve = |touch: &&TouchLine| {
         let travels = touch.curve.iter().map(|[_, travel, ..]| *travel);
         let deepest = travels.fold(f64::NEG_INFINITY, f64::max);

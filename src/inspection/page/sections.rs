@@ -29,7 +29,7 @@ pub(super) fn head(record: &InspectionRecord) -> Markup {
     }
 }
 
-/// The rule in a few words.
+/// Short name of the rule.
 pub(super) fn rule_name(record: &InspectionRecord) -> String {
     match &*record.rule {
         "simple" => "simple acceptance, no guard bands".to_owned(),
@@ -86,10 +86,10 @@ pub(super) fn verdict(record: &InspectionRecord) -> Markup {
     }
 }
 
-/// Most relations that are listed.
+/// Most relations in the list.
 const MOST_RELATIONS: usize = 24;
 
-/// Form and relations of the features in the drawing, also of what has no tolerance.
+/// Form and relations of the drawing's features, with or without a tolerance.
 pub(super) fn form_and_relations(input: &ReportInput<'_>) -> Markup {
     let k = input.inspected.record.coverage_factor;
     let (forms, relations) = (forms(input, k), relations(input, k));

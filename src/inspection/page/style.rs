@@ -1,6 +1,6 @@
-//! How the report looks, on a screen and on A4.
+//! Look of the report, on a screen and on A4.
 
-/// The style sheet: it asks for nothing outside of the page.
+/// Style sheet without external resources.
 pub(super) const CSS: &str = "\
 @page { size: A4; margin: 14mm 14mm 17mm; @bottom-right { content: \"page \" counter(page) \" of \" counter(pages); } }
 @page { @bottom-left { font: 7.5pt system-ui, sans-serif; color: #555; } @bottom-right { font: 7.5pt system-ui, sans-serif; color: #555; } }

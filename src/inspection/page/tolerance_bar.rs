@@ -1,4 +1,4 @@
-//! A characteristic drawn: tolerance zone, acceptance zone, measured value with its expanded
+//! Bar of a characteristic: tolerance zone, acceptance zone, measured value with its expanded
 //! uncertainty.
 
 use maud::{Markup, html};
@@ -6,11 +6,11 @@ use maud::{Markup, html};
 use crate::features::InspectedQuantity;
 use crate::io::inspection_file::CharacteristicRecord;
 
-/// Pixels.
+/// Width, pixels.
 const WIDTH: f64 = 150.0;
 const DARK: &str = "#1d2129";
 
-/// The drawing as SVG; nothing without a limit.
+/// The bar as SVG; empty without a limit.
 pub(super) fn tolerance_bar(one: &CharacteristicRecord) -> Markup {
     let number = |name: &str| one.number(name);
     let (lower, upper, actual) = (
@@ -19,7 +19,7 @@ pub(super) fn tolerance_bar(one: &CharacteristicRecord) -> Markup {
         number("actual"),
     );
     let spread = number("expanded_uncertainty").unwrap_or(0.0);
-    // of a single limit the zone is drawn as wide as the value is away from it
+    // a single limit draws the zone as wide as the value's distance from the limit
     let reach = actual.zip(lower.or(upper)).map_or(1.0, |(y, limit)| {
         (y - limit).abs().max(2.0 * spread).max(1e-6) * 1.6
     });

@@ -12,7 +12,7 @@ use crate::inspection::rows::Balloon;
 use crate::io::features_file::FeatureRecord;
 use crate::io::inspection_file::CharacteristicRecord;
 
-/// The section; says so without touches.
+/// The section; without touches a note.
 pub(super) fn touches(input: &ReportInput<'_>) -> Markup {
     let balloons = || input.inspected.balloons.iter();
     let missing = balloons().filter(|balloon| balloon.feature.is_none());
