@@ -6,7 +6,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, Render, html};
 
 /// A whole document.
 ///
-/// - `style`: its style sheet, as it is.
+/// - `style`: its style sheet, verbatim.
 pub fn document(title: &str, style: &str, body: &Markup) -> String {
     printable(&html! {
         (DOCTYPE)
@@ -22,8 +22,7 @@ pub fn document(title: &str, style: &str, body: &Markup) -> String {
     })
 }
 
-/// Markup as text, with a blank for each control character: neither HTML nor XML has a place for
-/// them.
+/// Markup as text, with a blank for each control character: HTML and XML allow none.
 pub fn printable(markup: &Markup) -> String {
     let is_refused = |letter: char| letter.is_control() && letter != '\n';
     markup.0.replace(is_refused, " ")
@@ -31,7 +30,7 @@ pub fn printable(markup: &Markup) -> String {
 
 /// A table with a head that printers repeat.
 ///
-/// - `rows`: the cells of each, with their tags.
+/// - `rows`: the cells of each row, with their tags.
 pub fn table<H: Render>(
     class: &str,
     heads: impl IntoIterator<Item = H>,
@@ -45,12 +44,12 @@ pub fn table<H: Render>(
     }
 }
 
-/// The bytes of a PNG file as an address (RFC 2397).
+/// The bytes of a PNG file as a data URL (RFC 2397).
 pub fn picture_address(png: &[u8]) -> String {
     format!("data:image/png;base64,{}", BASE64_STANDARD.encode(png))
 }
 
-/// A text as a string of CSS, which can end neither the string nor the style.
+/// A text as a CSS string that can end neither the string nor the style.
 pub fn css_string(text: &str) -> String {
     let letter = |letter: char| match letter {
         letter if letter.is_ascii_alphanumeric() || letter == ' ' => letter.to_string(),

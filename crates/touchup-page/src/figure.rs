@@ -2,24 +2,24 @@
 
 use serde::{Deserialize, Serialize};
 
-/// How an axis is divided.
+/// Scale of an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Scale {
     /// equal steps are equal differences
     Linear,
-    /// equal steps are equal ratios; values that are not above 0 are not shown
+    /// equal steps are equal ratios; values must be above 0 to appear
     Log,
 }
 
 /// One axis of a figure.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Axis {
-    /// quantity and unit, as a person reads them: "time per sample, µs"
+    /// quantity and unit for a reader: "time per sample, µs"
     pub label: String,
-    /// the same as the head of a column: `time_per_sample_us`
+    /// quantity and unit as a column head: `time_per_sample_us`
     pub column: String,
-    /// how it is divided
+    /// linear or logarithmic
     pub scale: Scale,
     /// its ends; `None`: around the marks
     #[serde(skip)]
@@ -38,17 +38,17 @@ impl Axis {
         }
     }
 
-    /// An axis of equal differences.
+    /// A linear axis.
     pub fn linear(label: &str, column: &str) -> Self {
         Self::of(label, column, Scale::Linear)
     }
 
-    /// An axis of equal ratios.
+    /// A logarithmic axis.
     pub fn log(label: &str, column: &str) -> Self {
         Self::of(label, column, Scale::Log)
     }
 
-    /// From one value to another, with numbers at both and in the middle.
+    /// Fixed ends, with numbers at both and in the middle.
     #[must_use]
     pub fn within(self, ends: [f64; 2]) -> Self {
         let ends = Some(ends);
@@ -56,8 +56,8 @@ impl Axis {
     }
 }
 
-/// A value with its spread over repeats: the median, and a tenth of the repeats on either side. One
-/// that was not repeated has none.
+/// A value with its spread over repeats: median, 10th and 90th percentile. A value without repeats
+/// has no spread.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Spread {
     /// median, or the only value
@@ -69,7 +69,7 @@ pub struct Spread {
 }
 
 impl Spread {
-    /// Of values that were measured; `None` where there are none.
+    /// Spread of measured values; `None` without values.
     pub fn of(mut values: Vec<f64>) -> Option<Self> {
         values.sort_by(f64::total_cmp);
         let last = values.len().checked_sub(1)? as f64;
@@ -80,7 +80,7 @@ impl Spread {
         )
     }
 
-    /// All three times a factor that is not negative.
+    /// Scales all three by a nonnegative factor.
     #[must_use]
     pub fn times(self, factor: f64) -> Self {
         self.numbers().map(|value| value * factor).into()
@@ -107,14 +107,14 @@ impl From<f64> for Spread {
 /// One point of a series.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Mark {
-    /// to the right
+    /// horizontal
     pub x: Spread,
-    /// upward
+    /// vertical
     pub y: Spread,
 }
 
 impl Mark {
-    /// At values with a spread or without.
+    /// A mark at values with or without a spread.
     pub fn at(x: impl Into<Spread>, y: impl Into<Spread>) -> Self {
         Self {
             x: x.into(),
@@ -123,37 +123,37 @@ impl Mark {
     }
 }
 
-/// How a series is drawn.
+/// Style of a series.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LineStroke {
-    /// marks, joined by a line
+    /// marks with a connecting line
     Joined,
     /// marks alone
     Marks,
-    /// a line without marks: a course of many values
+    /// a line without marks, through a large number of values
     Course,
     /// a thin dashed line without marks: a model, a limit
     Dashed,
-    /// dots alone: a cloud of many values
+    /// dots alone: a cloud of a large number of values
     Dots,
-    /// a field from the 10th to the 90th percentile upward
+    /// a vertical band from the 10th to the 90th percentile
     Band,
 }
 
 /// Marks that belong together.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Series {
-    /// in the legend, and in the CSV
+    /// name in the legend and in the CSV
     pub name: String,
-    /// how it is drawn
+    /// style
     pub stroke: LineStroke,
-    /// in the order in which they are joined
+    /// marks in drawing order
     pub marks: Vec<Mark>,
 }
 
 impl Series {
-    /// Marks that a line joins in their order.
+    /// Marks joined in their order.
     pub fn joined(name: impl Into<String>, marks: impl IntoIterator<Item = Mark>) -> Self {
         Self::new(name, LineStroke::Joined, marks)
     }
@@ -163,7 +163,7 @@ impl Series {
         Self::new(name, LineStroke::Dashed, marks)
     }
 
-    /// Of marks in the order in which they are joined.
+    /// A series of marks in drawing order.
     pub fn new(
         name: impl Into<String>,
         stroke: LineStroke,
@@ -177,28 +177,28 @@ impl Series {
     }
 }
 
-/// One cell grid of a map: a share of 0 to 1 at each pair of values.
+/// One grid of a map: a share of 0 to 1 at each pair of values.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Panel {
-    /// above it, and in the CSV
+    /// name above it and in the CSV
     pub name: String,
     /// middles of the columns, in the unit of the axis, rising
     pub xs: Vec<f64>,
     /// middles of the rows, in the unit of the axis, rising
     pub ys: Vec<f64>,
-    /// row by row, `ys.len() * xs.len()` of them; `None` where nothing was run
+    /// row by row, `ys.len() * xs.len()` of them; `None` without runs
     pub shares: Vec<Option<f64>>,
 }
 
-/// What a figure draws.
+/// Content of a figure.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Drawing {
     /// curves and marks in one frame
     Curves(Vec<Series>),
-    /// coloured grids beside each other, with one scale of colours
+    /// coloured grids beside each other, with one colour scale
     Maps {
-        /// what the share is of: "stable runs"
+        /// whole of the share: "stable runs"
         share_of: String,
         /// at least one
         panels: Vec<Panel>,
@@ -210,25 +210,25 @@ pub enum Drawing {
 pub struct Figure {
     /// file name of its SVG and CSV, without ending: `work_precision_stiff`
     pub id: String,
-    /// above it
+    /// heading
     pub title: String,
-    /// below it: what is shown, how many repeats, what to look at
+    /// text below the figure: content, number of repeats, points of interest
     pub caption: String,
-    /// to the right
+    /// horizontal axis
     pub x: Axis,
-    /// upward
+    /// vertical axis
     pub y: Axis,
-    /// what is drawn
+    /// content
     pub drawing: Drawing,
 }
 
 impl Figure {
-    /// Begins one with curves.
+    /// Starts a figure of curves.
     pub fn curves(id: impl Into<String>, series: impl IntoIterator<Item = Series>) -> Self {
         Self::of(id, Drawing::Curves(series.into_iter().collect()))
     }
 
-    /// Begins one with its drawing.
+    /// Starts a figure of any content.
     pub fn of(id: impl Into<String>, drawing: Drawing) -> Self {
         Self {
             id: id.into(),
@@ -240,7 +240,7 @@ impl Figure {
         }
     }
 
-    /// Above it.
+    /// Sets the heading.
     #[must_use]
     pub fn title(self, title: impl Into<String>) -> Self {
         Self {
@@ -249,13 +249,13 @@ impl Figure {
         }
     }
 
-    /// What is to the right, and what is upward.
+    /// Sets the horizontal and the vertical axis.
     #[must_use]
     pub fn axes(self, x: Axis, y: Axis) -> Self {
         Self { x, y, ..self }
     }
 
-    /// Below it.
+    /// Sets the caption.
     #[must_use]
     pub fn caption(self, caption: impl Into<String>) -> Self {
         Self {

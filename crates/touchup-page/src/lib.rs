@@ -1,5 +1,5 @@
-//! Pages that need nothing beside them: HTML documents without scripts, charts as SVG, and numbers
-//! as a person reads them. The same input gives the same bytes; letters are those of the viewer.
+//! Self-contained pages: HTML documents without scripts, charts as SVG, and readable numbers. The
+//! same input gives the same bytes; fonts are the viewer's.
 #![cfg_attr(not(test), warn(clippy::unwrap_used))]
 
 mod chart;

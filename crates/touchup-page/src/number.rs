@@ -1,12 +1,11 @@
-//! Numbers as a person reads them.
+//! Readable numbers.
 
-/// Digits of a power of ten.
+/// Superscript digits.
 const RAISED: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
-/// Between them a number is written out; beyond, as a multiple of a power of ten.
+/// Range of numbers in full digits; others are multiples of a power of ten.
 const WRITTEN_OUT: std::ops::Range<f64> = 1e-4..1e6;
 
-/// A number with three significant digits: 0.0123, 12300, 1.23·10⁻⁷; without the zeros that say
-/// nothing.
+/// A number with three significant digits, without trailing zeros: 0.0123, 12300, 1.23·10⁻⁷.
 pub fn three_digits(value: f64) -> String {
     if value == 0.0 {
         return "0".to_owned();
@@ -14,10 +13,10 @@ pub fn three_digits(value: f64) -> String {
     if !value.is_finite() {
         return if value.is_nan() { "none" } else { "infinite" }.to_owned();
     }
-    // rounded first: 999.7 is a number of four digits before the point
+    // round first: 999.7 has four digits before the point
     let rounded = format!("{value:.2e}");
     let (digits, exponent) = rounded.split_once('e').unwrap_or((&rounded, "0"));
-    // read again they lose the zeros that say nothing
+    // parsing drops trailing zeros
     let [rounded, digits] = [&rounded, digits].map(|text| text.parse().unwrap_or(value));
     if WRITTEN_OUT.contains(&rounded.abs()) {
         return rounded.to_string();
@@ -35,7 +34,7 @@ pub fn power_of_ten(exponent: i32) -> String {
     format!("10{sign}{}", raised.collect::<String>())
 }
 
-/// A number with this many digits behind the point, and the sign of mathematics; none before a 0.
+/// A number with this number of decimals and a true minus sign; none before a 0.
 pub fn fixed(value: f64, digits: usize) -> String {
     let text = format!("{value:.digits$}");
     if text.trim_matches(['-', '0', '.']).is_empty() {
@@ -45,12 +44,12 @@ pub fn fixed(value: f64, digits: usize) -> String {
     }
 }
 
-/// The same with a sign before any number.
+/// A number with these decimals and a sign before any number.
 pub fn signed(value: f64, digits: usize) -> String {
     format!("{value:+.digits$}").replace('-', "−")
 }
 
-/// The smallest and the largest; `None` where there are none.
+/// Smallest and largest value; `None` without values.
 pub fn range(values: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
     values
         .into_iter()

@@ -8,19 +8,19 @@ use super::frame::{ChartSize, Frame};
 use super::looks::Looks;
 use crate::figure::{Figure, LineStroke, Mark, Series};
 
-/// A legend is beside the frame if its lines are no wider.
+/// Widest lines of a legend beside the frame.
 const WIDEST_BESIDE: f64 = 230.0 + SAMPLE;
-/// The sample of line and mark in front of a name.
+/// Width of the line and mark sample in front of a name.
 const SAMPLE: f64 = 34.0;
-/// From line to line of the legend.
+/// Line spacing of the legend.
 const LINE: f64 = 21.0;
 
-/// Where the parts of a figure are.
+/// Layout of a figure.
 struct Layout {
     frame: Frame,
     /// middle of the first sample line of the legend
     legend: [f64; 2],
-    /// of the legend
+    /// columns of the legend
     columns: usize,
     /// lower edge
     bottom: f64,
@@ -117,7 +117,7 @@ fn draw_series(frame: &Frame, extents: [&Extent; 2], looks: &Looks, series: &Ser
     let look = looks.look(&series.name);
     let places = series.marks.iter().map(|mark| place(frame, extents, mark));
     let places: Vec<Option<[f64; 2]>> = places.collect();
-    // a mark without a place parts the line
+    // a mark without a place splits the line
     let stretches = places
         .split(Option::is_none)
         .filter(|stretch| stretch.len() > 1);
@@ -137,7 +137,7 @@ fn draw_series(frame: &Frame, extents: [&Extent; 2], looks: &Looks, series: &Ser
     }
 }
 
-/// From the 10th to the 90th percentile of both values, if they are apart: a line with a short
+/// Bars from the 10th to the 90th percentile of both values, if the two differ: a line with a short
 /// stroke across each end.
 fn bars(frame: &Frame, [x, y]: [&Extent; 2], mark: &Mark, [left, top]: [f64; 2]) -> Vec<String> {
     let ends = |extent: &Extent, axis: usize, [_, p10, p90]: [f64; 3]| {

@@ -1,8 +1,8 @@
-//! Elements of SVG, with coordinates to a tenth.
+//! SVG elements, with coordinates to a tenth.
 
 use maud::{Markup, html};
 
-/// Width of a text, a little more than it takes.
+/// Width of a text, slightly overestimated.
 pub(super) fn text_width(text: &str, size: f64) -> f64 {
     0.58 * size * text.chars().count() as f64
 }
@@ -13,19 +13,19 @@ pub(super) fn px(value: f64) -> String {
     ((value * 10.0).round() / 10.0 + 0.0).to_string()
 }
 
-/// Points as the attributes of lines and polygons have them.
+/// Points in the attribute syntax of lines and polygons.
 pub(super) fn points(places: impl IntoIterator<Item = [f64; 2]>) -> String {
     let places = places.into_iter().map(|place| place.map(px).join(","));
     places.collect::<Vec<_>>().join(" ")
 }
 
-/// A text whose `start`, `middle` or `end` (`anchor`) is at a place.
+/// A text with its `start`, `middle` or `end` (`anchor`) at a place.
 pub(super) fn label(at: [f64; 2], anchor: &str, size: f64, text: &str) -> Markup {
     let [x, y] = at.map(px);
     html! { text x=(x) y=(y) text-anchor=(anchor) font-size=(size) { (text) } }
 }
 
-/// A text that reads from below.
+/// A text that reads upward.
 pub(super) fn upward_label(at: [f64; 2], text: &str) -> Markup {
     let [x, y] = at.map(px);
     html! {

@@ -1,24 +1,23 @@
-//! Where values lie along an axis, and its marks.
+//! Axis extents: positions of values, and ticks.
 
 use crate::figure::{Axis, Scale};
 use crate::number::{fixed, power_of_ten, range, three_digits};
 
-/// Up to this number of decades each of them is marked, and their ninths have gridlines.
+/// Most decades with a mark at each power, and gridlines at their ninths.
 const DECADES_WITH_NINTHS: i32 = 4;
 /// Most marks with a number on an axis of powers.
 const MOST_POWERS: i32 = 9;
-/// About the number of marks on an axis of differences.
+/// Approximate number of marks on an axis of differences.
 const ABOUT: f64 = 6.0;
-/// Powers of ten that are written out: 0.01 to 10000.
+/// Powers of ten in full digits: 0.01 to 10000.
 const WRITTEN_OUT: std::ops::RangeInclusive<i32> = -2..=4;
 
-/// A stretch of an axis, in the coordinate that is even along it: the value, or its decimal
-/// logarithm.
+/// Extent of an axis, in the coordinate that is even along it: the value, or its decimal logarithm.
 pub(super) struct Extent {
     scale: Scale,
     low: f64,
     high: f64,
-    /// whether the axis has numbers at its ends and in the middle alone
+    /// whether the axis has numbers only at its ends and in the middle
     is_given: bool,
 }
 
@@ -32,8 +31,7 @@ pub(super) struct Tick {
 }
 
 impl Extent {
-    /// The ends of the axis, or around `values`, with some room; values without a place do not
-    /// count.
+    /// The ends of the axis, or a margin around `values`; ignores values without a place.
     pub fn around(axis: &Axis, values: impl Iterator<Item = f64>) -> Self {
         let scale = axis.scale;
         if let Some([low, high]) = axis.ends {
@@ -47,7 +45,7 @@ impl Extent {
         let (low, high) =
             range(values.filter_map(|value| even(scale, value))).unwrap_or((0.0, 1.0));
         let width = high - low;
-        // a single value still needs a stretch around it
+        // a single value still needs an extent
         let least = if scale == Scale::Log {
             0.3
         } else {
@@ -83,7 +81,7 @@ impl Extent {
         ticks
     }
 
-    /// At both ends and in the middle, to a hundredth of the stretch.
+    /// Ticks at both ends and in the middle, to a hundredth of the extent.
     fn end_ticks(&self) -> [Tick; 3] {
         let digits = (1.0 - (self.high - self.low).log10().floor()).max(0.0) as usize;
         [self.low, (self.low + self.high) / 2.0, self.high]
@@ -114,7 +112,7 @@ impl Extent {
         let ninths = (first..=last).flat_map(|power| (1..=most).map(move |ninth| (power, ninth)));
         let tick = |(power, ninth): (i32, i32)| {
             let value = f64::from(ninth) * 10f64.powi(power);
-            // with hardly a whole decade 2 and 5 need their numbers too
+            // below about one decade, 2 and 5 need their numbers too
             let label = match ninth {
                 1 if power.rem_euclid(every) != 0 => String::new(),
                 1 if !are_written_out => power_of_ten(power),

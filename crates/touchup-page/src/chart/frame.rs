@@ -5,28 +5,28 @@ use maud::{Markup, html};
 use super::element::{label, points, px, text_width};
 use super::extent::{Extent, Tick};
 
-/// A label closer than this to the one before it is left out.
+/// Least gap between labels; a closer label is left out.
 const LEAST_GAP: f64 = 8.0;
 
-/// The room that a chart has, in units of which a number on an axis is 12 high.
+/// Size of a chart, in units such that numbers on an axis are 12 high.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ChartSize {
-    /// of the whole picture
+    /// width of the whole picture
     pub width: f64,
-    /// of the frame
+    /// height of the frame
     pub height: f64,
-    /// whether title and legend are drawn
+    /// whether the chart has title and legend
     pub is_labelled: bool,
 }
 
 impl ChartSize {
-    /// Over the width of a page.
+    /// Width of a page.
     pub const PAGE: Self = Self {
         width: 900.0,
         height: 400.0,
         is_labelled: true,
     };
-    /// A third of that, for one of several beside each other.
+    /// A third of that height, for several charts beside each other.
     pub const SMALL: Self = Self {
         width: 480.0,
         height: 132.0,
@@ -34,7 +34,7 @@ impl ChartSize {
     };
 }
 
-/// The rectangle in which values have places.
+/// Rectangle of the plotted values.
 pub(super) struct Frame {
     pub left: f64,
     pub top: f64,
@@ -43,7 +43,7 @@ pub(super) struct Frame {
 }
 
 impl Frame {
-    /// From its upper left corner.
+    /// A frame at its upper left corner.
     pub fn new([left, top]: [f64; 2], [width, height]: [f64; 2]) -> Self {
         Self {
             left,
@@ -61,7 +61,7 @@ impl Frame {
         self.top + self.height
     }
 
-    /// The place of two shares of the axes, each 0 to 1.
+    /// Place of two axis fractions, each 0 to 1.
     pub fn place(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         [self.left + x * self.width, self.bottom() - y * self.height]
     }
@@ -77,7 +77,7 @@ impl Frame {
             .map(|tick| (tick, [[0.0, tick.at], [1.0, tick.at]]));
         html! {
             @for (tick, ends) in upward.chain(level) {
-                // a line without a number is fainter
+                // lines without a number are fainter
                 polyline points=(points(ends.map(|end| self.place(end))))
                     stroke=(if tick.label.is_empty() { "#efefef" } else { "#d6d6d6" }) {}
             }
@@ -91,7 +91,7 @@ impl Frame {
         html! { rect x=(x) y=(y) width=(width) height=(height) fill="none" stroke="#444" {} }
     }
 
-    /// Numbers below the frame, as many as have room.
+    /// Numbers below the frame, as far as they fit.
     pub fn x_labels(&self, ticks: &[Tick]) -> Markup {
         let mut free_from = f64::NEG_INFINITY;
         let mut has_room = |tick: &&Tick| {

@@ -1,4 +1,4 @@
-//! How one series differs from another: by colour, and without it by mark and dashes.
+//! Looks of series: distinct by colour, and without colour by mark and dashes.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -11,9 +11,9 @@ use crate::figure::{Drawing, Figure, LineStroke};
 const COLOURS: [&str; 8] = [
     "#0072b2", "#d55e00", "#009e73", "#b5559b", "#3a9bd9", "#b87d00", "#000000", "#7a7a7a",
 ];
-/// Of the lines between marks; the first is whole.
+/// Dashes of lines between marks; the first is solid.
 const DASHES: [&str; 4] = ["", "7 3", "2 3", "9 3 2 3"];
-/// Of lines without marks.
+/// Dashes of lines without marks.
 const MODEL_DASHES: [&str; 4] = ["4 4", "10 4", "1 3", "10 3 1 3"];
 /// Outlines of the marks around their middle.
 const MARKS: [&str; 8] = [
@@ -34,8 +34,8 @@ const FILLED: usize = 4;
 pub struct Looks(BTreeMap<String, usize>);
 
 impl Looks {
-    /// Names keep the look of their first figure; a new one gets the first look that none beside it
-    /// has, in any figure.
+    /// Names keep the look of their first figure; a new name gets the first look that no neighbour
+    /// has in any figure.
     pub fn of<'a>(figures: impl Iterator<Item = &'a Figure>) -> Self {
         let names = |figure: &'a Figure| match &figure.drawing {
             Drawing::Curves(series) => series.iter().map(|one| one.name.as_str()).collect(),
@@ -67,7 +67,7 @@ impl Look {
         COLOURS[self.0 % COLOURS.len()]
     }
 
-    /// The line through points; nothing for marks alone.
+    /// The line through points; empty for marks alone.
     pub fn line(self, stroke: LineStroke, points: &str) -> Markup {
         let (width, opacity, dashes) = match stroke {
             LineStroke::Joined => (1.6, 1.0, DASHES[(self.0 / 2) % DASHES.len()]),
@@ -82,10 +82,10 @@ impl Look {
         }
     }
 
-    /// One of eight marks, or a dot; nothing for lines alone.
+    /// One of eight marks, or a dot; empty for lines alone.
     pub fn mark(self, stroke: LineStroke, place: [f64; 2]) -> Markup {
         let [x, y] = place.map(px);
-        // beyond eight, where colours come again, other shapes go with them
+        // beyond eight series, repeated colours have other shapes
         let shape = (self.0 + self.0 / COLOURS.len()) % MARKS.len();
         let (colour, is_filled) = (self.colour(), shape < FILLED);
         match stroke {

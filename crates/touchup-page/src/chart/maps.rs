@@ -1,4 +1,4 @@
-//! Coloured grids beside each other, with one bar of colours for all.
+//! Coloured grids beside each other, with one colour bar.
 
 use maud::{Markup, html};
 
@@ -8,8 +8,7 @@ use super::frame::Frame;
 use crate::figure::{Axis, Figure, Panel, Scale};
 use crate::number::{power_of_ten, three_digits};
 
-/// Room for the numbers and the name of the axis on the left, between grids, for the bar on the
-/// right, and below.
+/// Room on the left for numbers and axis name, between grids, on the right for the bar, and below.
 const LEFT: f64 = 82.0;
 const GAP: f64 = 32.0;
 const BAR: f64 = 110.0;
@@ -19,9 +18,9 @@ const TOP: f64 = 60.0;
 const NAME: f64 = 22.0;
 /// Most grids beside each other.
 const ACROSS: usize = 4;
-/// Steps of the bar of colours.
+/// Steps of the colour bar.
 const STEPS: usize = 50;
-/// From none to all: dark blue to light yellow, rising in brightness, so that it reads in grey too
+/// From 0 to 1: dark blue to light yellow, of rising brightness, so that it reads in grey too
 /// (viridis).
 const COLOURS: [[f64; 3]; 6] = [
     [68.0, 1.0, 84.0],
@@ -36,7 +35,7 @@ const NOTHING: &str = "#e4e4e4";
 
 /// The drawing, and its lower edge.
 pub(super) fn draw(figure: &Figure, share_of: &str, panels: &[Panel], page: f64) -> (Markup, f64) {
-    // the fewest lines, evenly filled
+    // fewest rows, evenly filled
     let lines = panels.len().div_ceil(ACROSS).max(1);
     let across = panels.len().div_ceil(lines).max(1);
     let width = (page - LEFT - BAR - (across - 1) as f64 * GAP) / across as f64;
@@ -65,8 +64,8 @@ pub(super) fn draw(figure: &Figure, share_of: &str, panels: &[Panel], page: f64)
     (drawing, bottom)
 }
 
-/// A rectangle from its upper left corner, without a white hair around it, that says `title` to
-/// who points at it.
+/// A rectangle from its upper left corner, without a white hairline around it, with `title` as its
+/// tooltip.
 fn cell(corner: [f64; 2], size: [f64; 2], colour: &str, title: &str) -> Markup {
     let ([x, y], [width, height]) = (corner.map(px), size.map(px));
     html! {
@@ -113,7 +112,7 @@ fn draw_panel(frame: &Frame, figure: &Figure, panel: &Panel) -> Markup {
     }
 }
 
-/// Numbers at the middles of cells, at most about `most`; powers of ten first.
+/// Numbers at the middles of cells, about `most` at most; powers of ten first.
 fn labels(values: &[f64], axis: &Axis, most: f64) -> Vec<Tick> {
     let is_power = |value: f64| {
         axis.scale == Scale::Log && (value.log10() - value.log10().round()).abs() < 1e-9

@@ -1,5 +1,5 @@
 //! Figures as SVG, on white. The drawing is our own: plotters (0.3) has no legend beside its frame
-//! and no title of a cell to point at.
+//! and no tooltips of cells.
 
 mod curves;
 mod element;
@@ -16,14 +16,14 @@ pub use looks::Looks;
 
 use crate::figure::{Drawing, Figure};
 
-/// Size of the letters of the provenance.
+/// Font size of the provenance.
 const SMALL: f64 = 10.5;
 
 impl Figure {
-    /// The figure as a picture of its own.
+    /// The figure as a stand-alone picture.
     ///
-    /// - `looks`: of its series.
-    /// - `provenance`: in small letters below it.
+    /// - `looks`: looks of its series.
+    /// - `provenance`: small print below it.
     pub fn svg(&self, looks: &Looks, size: ChartSize, provenance: &str) -> Markup {
         let (drawing, bottom) = match &self.drawing {
             Drawing::Curves(series) => curves::draw(self, series, looks, size),
@@ -54,7 +54,7 @@ impl Figure {
     }
 }
 
-/// The words of a text in lines that are no wider than `width`, as far as words allow.
+/// Breaks a text into lines no wider than `width`, unless a single word is wider.
 fn lines_of(text: &str, size: f64, width: f64) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for word in text.split_whitespace() {
