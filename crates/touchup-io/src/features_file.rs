@@ -1,4 +1,4 @@
-//! Files of features, JSON: lengths in mm, angles in degrees, in the frame of the mesh.
+//! Features files, JSON: lengths in mm, angles in degrees, in the mesh frame.
 
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -15,18 +15,18 @@ use touchup_core::features::clusters::{Bend, Cluster};
 use touchup_core::features::{Feature, Form, InspectedQuantity, Measured, Relation, relations};
 use touchup_core::form::Deviation;
 
-/// Why a file of features could not be read or written.
+/// Error of reading or writing a features file.
 #[derive(Debug, thiserror::Error)]
 pub enum FeaturesFileError {
-    /// It could not be read or written.
+    /// The file is unreadable or unwritable.
     #[error(transparent)]
     File(#[from] FileError),
-    /// It is no file of features.
+    /// The file is no features file.
     #[error("{} is no file of features: {source}", path.display())]
     NoFeatures {
-        /// the file
+        /// path of the file
         path: PathBuf,
-        /// why, with line and column
+        /// cause, with line and column
         source: serde_json::Error,
     },
 }
@@ -36,13 +36,13 @@ pub enum FeaturesFileError {
 pub struct FeatureFile {
     /// in order of `id`
     pub features: Vec<FeatureRecord>,
-    /// how touched features lie to one another
+    /// relations between touched features
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub relations: Vec<RelationRecord>,
     /// share of the mesh's area that belongs to no plane, cylinder or cone and is not searched
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unexplained: Option<f64>,
-    /// places of high curvature, the paper's method for features; there only in that mode
+    /// places of high curvature, the paper's method for features; only in that mode
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub clusters: Vec<ClusterRecord>,
 }
@@ -53,41 +53,41 @@ reported! {
     pub struct ClusterRecord, fn of(cluster: &Cluster) {
         /// their middle
         pub center_mm: [f64; 3] = point_mm(&cluster.center),
-        /// how many
+        /// number of vertices
         pub vertices: usize = cluster.vertices.len(),
-        /// whether they bend outward, as the rim of a hole; left out where the number of clusters
-        /// was given
+        /// whether they bend outward, as the rim of a hole; absent if the number of clusters was
+        /// given
         pub convex?: bool = cluster.bend.map(|bend| bend == Bend::Convex),
     }
 }
 
 reported! {
-    /// How far a touched surface is off its ideal form: widths of the narrowest zones (ISO 1101)
-    /// over what was touched of it. 0 where nothing stands out of the noise: then `std` is what
+    /// Deviation of a touched surface from its ideal form: widths of the narrowest zones (ISO 1101)
+    /// over its touched part. 0 if nothing stands out of the noise: then `std` is the amount that
     /// noise may hide.
     #[derive(Clone, Deserialize)]
     pub struct FormRecord, fn of(form: &Form) {
-        /// round walls: `roundness_mm` of the mean section, `cylindricity_mm` if they were touched
-        /// at several heights, `straightness_mm` if they were touched at three heights all around
-        /// (diameter of the cylinder that holds the axis); planes: `flatness_mm`
+        /// round walls: `roundness_mm` of the mean section, `cylindricity_mm` for touches at
+        /// several heights, `straightness_mm` for touches at three heights all around (diameter of
+        /// the cylinder that holds the axis); planes: `flatness_mm`
         #[serde(flatten, deserialize_with = "known_numbers")]
         pub numbers: NumbersByQuantity = form
             .deviations()
             .map(|(quantity, deviation)| (quantity, quantity.from_si(deviation.minimum_zone.value)))
             .collect(),
-        /// the same by their names about the reference of least squares
+        /// the same numbers about the least-squares reference
         #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
         pub least_squares: BTreeMap<String, f64> = estimates(form, |deviation| deviation.least_squares.value),
         /// standard uncertainties by name of the number
         #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
         pub std: BTreeMap<String, f64> = estimates(form, |deviation| deviation.minimum_zone.std),
         /// share of the turn, or of the rectangle around the touches, that they cover: the form of
-        /// the rest is not known
+        /// the rest is unknown
         #[serde(default)]
         pub coverage: f64 = form.coverage(),
-        /// round walls: most undulations per turn that were looked for
+        /// round walls: largest number of undulations per turn in the search
         pub undulations?: u32 = form.round().map(|round| round.undulations),
-        /// round walls: undulations per turn of what was found
+        /// round walls: undulations per turn of the lobes found
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
         pub lobes: Vec<u32> = form.round().map_or_else(Vec::new, |round| round.lobes.clone()),
     }
@@ -107,7 +107,7 @@ fn estimates(form: &Form, number: impl Fn(Deviation) -> f64) -> BTreeMap<String,
 /// Numbers by their quantities, mm and degrees.
 type NumbersByQuantity = BTreeMap<InspectedQuantity, f64>;
 
-/// Keys of other names are passed over.
+/// Ignores keys of other names.
 fn known_numbers<'de, D: Deserializer<'de>>(object: D) -> Result<NumbersByQuantity, D::Error> {
     BTreeMap::<String, Option<Value>>::deserialize(object)?
         .into_iter()
@@ -137,7 +137,7 @@ impl FormRecord {
 }
 
 reported! {
-    /// How one touched feature lies to another; what does not apply is left out.
+    /// Relation of one touched feature to another, without inapplicable keys.
     #[derive(Clone, Deserialize)]
     pub struct RelationRecord, fn of(relation: &Relation) {
         /// `perpendicularity`, `parallelism`, `coaxiality` or `distance`
@@ -177,42 +177,42 @@ impl RelationRecord {
 }
 
 reported! {
-    /// One feature; what does not apply to its kind, or is not known, is left out.
+    /// One feature, without inapplicable or unknown keys.
     #[derive(Clone, Deserialize)]
     pub struct FeatureRecord, pub fn of(feature: &Feature) {
-        /// stays the same while the feature is refined
+        /// constant during refinement of the feature
         #[serde(default)]
         pub id: u32 = feature.id,
         /// `hole`, `slot`, `pocket`, `boss`, `edge`, `corner` or `plane`
         pub kind: String = feature.kind.name().to_owned(),
-        /// hole, slot, pocket: where the axis goes through the opening; boss: middle of its foot;
-        /// edge, plane: its middle; corner: itself
+        /// hole, slot, pocket: axis point in the opening; boss: middle of its foot; edge,
+        /// plane: its middle; corner: itself
         pub center_mm?: [f64; 3] = Some(point_mm(&feature.centre.value)),
         /// hole, slot, pocket: out of the opening; boss: away from its foot; edge: along it; plane:
         /// outward normal. Unit vector
         pub axis?: [f64; 3] = feature.axis.as_ref().map(|axis| axis.value.into()),
         /// hole, boss
         pub diameter_mm?: f64 = size(feature, InspectedQuantity::Diameter),
-        /// slot: over its ends, of an open one as far as its walls go; pocket; edge: as far as it
-        /// was seen
+        /// slot: over its ends, or the extent of its walls if open; pocket; edge: its visible
+        /// extent
         pub length_mm?: f64 = size(feature, InspectedQuantity::Length),
         /// slot, pocket
         pub width_mm?: f64 = size(feature, InspectedQuantity::Width),
-        /// hole, slot, pocket: from opening to floor, of one that goes through as far as its wall
-        /// goes (of a drilled hole without the tip; of a round opening in a sheet left out, as is
-        /// `through`); boss: its height. Where the wall was touched and floor or top was not, as
-        /// far as that was: see `depth_is_at_least`
+        /// hole, slot, pocket: from opening to floor, or the extent of the wall of a through
+        /// feature (drilled hole: without the tip; round opening in a sheet: absent, like
+        /// `through`); boss: its height. Touches on the wall but not on floor or top give their
+        /// extent: see `depth_is_at_least`
         pub depth_mm?: f64 = size(feature, InspectedQuantity::Depth),
-        /// whether `depth_mm` is a lower bound; left out where it is none
+        /// whether `depth_mm` is a lower bound; absent if not
         pub depth_is_at_least?: bool = feature.depth.as_ref().filter(|depth| depth.is_at_least).map(|_| true),
-        /// hole, slot, pocket; left out where the mesh ends before the hole does, or its floor is
+        /// hole, slot, pocket; absent if the mesh ends before the hole, or if its floor is
         /// untouched
         pub through?: bool = feature.through,
         /// hole: full angle of its countersink
         pub cone_angle_deg?: f64 = size(feature, InspectedQuantity::ConeAngle),
         /// slot, pocket: along it, unit vector
         pub direction?: [f64; 3] = feature.direction.map(Into::into),
-        /// holes with the same number are steps of one
+        /// shared by the steps of one stepped hole
         pub group?: u32 = feature.group,
         /// edge, slot, pocket: both ends
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -225,20 +225,20 @@ reported! {
         #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
         pub std: BTreeMap<String, f64> =
             known(feature).filter_map(|(name, std, _)| Some((name.to_owned(), std?))).collect(),
-        /// hole, notch, boss, cylinder, plane: how far what was touched, or drawn, is off its ideal
-        /// form
+        /// hole, notch, boss, cylinder, plane: deviation of the touched, or drawn, surface from its
+        /// ideal form
         pub form?: FormRecord = feature.form.as_ref().map(FormRecord::of),
-        /// hole, notch, boss, cylinder, slot, pocket of a drawing: how far the middles of its facets
-        /// lie inside the round surface through their corners; left out if there are none
+        /// hole, notch, boss, cylinder, slot, pocket of a drawing: distance of the middles of its
+        /// facets inside the round surface through their corners; absent without facets
         pub facets_mm?: f64 = feature.facets.map(|m| m * 1e3),
         /// share of its surface within a ball's radius of a touch
         #[serde(default)]
         pub touched: f64 = feature.touched,
-        /// `touches`, or `mesh` where too little was touched
+        /// `touches`, or `mesh` if touches are too few
         #[serde(default)]
         pub fitted_to: String = feature.fitted_to.name().to_owned(),
-        /// the touches behind each number, by its name: runs of numbers in the file of touches,
-        /// first and last
+        /// touches behind each number, by its name: runs of numbers in the touches file, first and
+        /// last
         #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
         pub touches: BTreeMap<String, Vec<[u32; 2]>> = known(feature)
             .filter(|(.., touches)| !touches.is_empty())
@@ -305,7 +305,7 @@ fn runs(numbers: &[u32]) -> Vec<[u32; 2]> {
 }
 
 impl FeatureFile {
-    /// The features as a file has them.
+    /// Content of a features file.
     pub fn of(features: &[Feature], unexplained: f64) -> Self {
         let relations = relations(features).iter().map(RelationRecord::of).collect();
         let features = features.iter().map(FeatureRecord::of).collect();
@@ -317,12 +317,12 @@ impl FeatureFile {
         }
     }
 
-    /// The feature of a number.
+    /// Feature by number.
     pub fn feature(&self, id: u32) -> Option<&FeatureRecord> {
         self.features.iter().find(|feature| feature.id == id)
     }
 
-    /// Clusters alone.
+    /// A file of clusters alone.
     pub fn of_clusters(clusters: &[Cluster]) -> Self {
         Self {
             clusters: clusters.iter().map(ClusterRecord::of).collect(),

@@ -1,5 +1,5 @@
-//! Features and touches as a table of columns: CSV, or Parquet, which pandas, Polars, DuckDB and
-//! Ray read with its types.
+//! Features and touches as a table: CSV, or Parquet, which pandas, Polars, DuckDB and Ray read with
+//! its types.
 
 use std::borrow::Cow;
 use std::io::{self, Write};
@@ -15,13 +15,13 @@ use touchup_core::stylus::ProbedPoint;
 
 mod parquet_file;
 
-/// Why a table was not written.
+/// Error of writing a table.
 #[derive(Debug, thiserror::Error)]
 pub enum ResultTableError {
     /// The system refused.
     #[error(transparent)]
     File(#[from] FileError),
-    /// Its columns do not make a file of Parquet.
+    /// The columns do not fit Parquet.
     #[error("the table does not fit Parquet: {0}")]
     Parquet(#[from] ParquetError),
 }
@@ -54,8 +54,8 @@ pub struct ResultTable {
 }
 
 impl ResultTable {
-    /// No rows yet, and the columns of this one, which are there whether or not any row has a value
-    /// for them: those of `Null` too.
+    /// An empty table with the columns of this row, `Null` included; they stay even if no row has a
+    /// value for them.
     pub fn with_columns_of(row: &[(String, Value)]) -> Self {
         let mut cells = Vec::new();
         for (name, value) in row {
@@ -75,8 +75,8 @@ impl ResultTable {
         }
     }
 
-    /// A row for each feature; what is nested has its name behind that of what it is in, with `.`
-    /// between, coordinates `_x`, `_y`, `_z`.
+    /// A row for each feature; a nested value's name follows its parent's after a `.`, coordinates
+    /// end in `_x`, `_y`, `_z`.
     pub fn of_features(features: &[FeatureRecord]) -> Self {
         let mut table = Self::default();
         for feature in features {
@@ -89,7 +89,7 @@ impl ResultTable {
         table
     }
 
-    /// A row for each touch, with the columns and the digits of a file of touches.
+    /// A row for each touch, with the columns and digits of a touches file.
     pub fn of_touches(touches: &[ProbedPoint]) -> Self {
         let mut table = Self::default();
         for (number, touch) in touches.iter().enumerate() {
@@ -99,7 +99,7 @@ impl ResultTable {
         table
     }
 
-    /// A row for each line of a file of touches.
+    /// A row for each line of a touches file.
     ///
     /// # Errors
     /// [`TouchesFileError`]
@@ -118,8 +118,8 @@ impl ResultTable {
         );
     }
 
-    /// A row of values by their names, each name once; what is nested is named as of features, and
-    /// `Null` is no value.
+    /// Adds a row of values by their names, each name once; nested names as in features, `Null` is
+    /// no value.
     pub fn add_json(&mut self, row: &[(String, Value)]) {
         let mut cells = Vec::new();
         row.iter()
@@ -147,12 +147,12 @@ impl ResultTable {
             .for_each(|(_, column)| column.resize(self.rows, None));
     }
 
-    /// How many rows.
+    /// Number of rows.
     pub fn rows(&self) -> usize {
         self.rows
     }
 
-    /// Each row as an object of JSON, without what it has not.
+    /// Each row as a JSON object, without missing values.
     pub fn json_rows(&self) -> Vec<Value> {
         let mut rows = vec![Map::new(); self.rows];
         for (name, column) in &self.columns {
@@ -165,7 +165,7 @@ impl ResultTable {
         rows.into_iter().map(Value::Object).collect()
     }
 
-    /// Writes it, as a whole or not at all: Parquet where the name ends so, else CSV.
+    /// Writes the table, as a whole or not at all: Parquet by the file's ending, else CSV.
     ///
     /// # Errors
     /// [`ResultTableError`]
@@ -189,7 +189,7 @@ impl ResultTable {
     }
 }
 
-/// Whether a file of this name is written as a table: CSV or Parquet.
+/// Whether the file name's ending means a table: CSV or Parquet.
 pub fn is_table(path: &Path) -> bool {
     has_ending(path, "csv") || has_ending(path, "parquet")
 }
@@ -199,8 +199,8 @@ fn has_ending(path: &Path, ending: &str) -> bool {
         .is_some_and(|found| found.eq_ignore_ascii_case(ending))
 }
 
-/// Writes features in the form that the ending names, as a whole or not at all: a table where it
-/// [is one](is_table), else JSON.
+/// Writes features in the form of the ending, as a whole or not at all: a [table](is_table), else
+/// JSON.
 ///
 /// # Errors
 /// [`ResultTableError`]
@@ -211,8 +211,8 @@ pub fn write_features_as_named(path: &Path, file: &FeatureFile) -> Result<(), Re
     }
 }
 
-/// Writes touches in the form that the ending names, as a whole or not at all: Parquet, else a
-/// [file of touches](touches_file).
+/// Writes touches in the form of the ending, as a whole or not at all: Parquet, else a [touches
+/// file](touches_file).
 ///
 /// # Errors
 /// [`ResultTableError`]
@@ -236,7 +236,7 @@ fn text_of(cell: Option<&Cell>) -> String {
     }
 }
 
-/// A value of a record as text of a table: a number without exponent, `null` empty.
+/// A record's value as table text: a number without exponent, `null` empty.
 pub(crate) fn cell_text(value: Option<&Value>) -> String {
     let mut cells = Vec::new();
     flatten("", value.unwrap_or(&Value::Null), &mut cells);
@@ -254,7 +254,7 @@ fn touch_cell(name: &str, value: &str) -> Cell {
     cell.unwrap_or_else(|| Cell::Text(value.to_owned()))
 }
 
-/// Adds the values that are in `value` by their names.
+/// Adds the values inside `value` by their names.
 fn flatten(name: &str, value: &Value, cells: &mut Vec<(String, Cell)>) {
     let mut add = |cell| cells.push((name.to_owned(), cell));
     match value {
@@ -270,7 +270,7 @@ fn flatten(name: &str, value: &Value, cells: &mut Vec<(String, Cell)>) {
                 flatten(&format!("{name}_{axis}"), value, cells);
             }
         }
-        // what has a length of its own is kept as JSON
+        // keeps values of variable length as JSON
         Value::Array(_) => add(Cell::Text(value.to_string())),
         Value::Object(values) => {
             for (key, value) in values {

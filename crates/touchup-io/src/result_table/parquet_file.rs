@@ -1,4 +1,4 @@
-//! A table as a file of Parquet, each column with its type.
+//! A table as a Parquet file, each column with its type.
 
 use std::sync::Arc;
 
@@ -59,8 +59,8 @@ enum Kind {
     Text,
 }
 
-/// That of all its values; whole numbers among others are numbers, what is mixed otherwise is text,
-/// and so is a column without a value.
+/// Common type of a column: whole numbers among others are numbers; other mixtures and columns
+/// without a value are text.
 fn kind_of(column: &[Option<Cell>]) -> Kind {
     let is_all = |is: fn(&Cell) -> bool| column.iter().flatten().all(is);
     if column.iter().all(Option::is_none) {
@@ -108,7 +108,7 @@ fn write_values<T: DataType>(
     value: impl Fn(&Cell) -> T::T,
 ) -> Result<(), ParquetError> {
     let values: Vec<T::T> = column.iter().flatten().map(value).collect();
-    // an optional value is there at level 1
+    // a present optional value has level 1
     let levels: Vec<i16> = column
         .iter()
         .map(|cell| i16::from(cell.is_some()))
