@@ -1,10 +1,10 @@
 //! Repairs a 3D scan of a work-piece by touch.
 //!
 //! A stylus or a robot-held probe touches the real part. From the tip's pose and the measured force
-//! touchup predicts what the force that the scan implies, compares it with the measured force (the
+//! touchup predicts the force that the scan implies, compares it with the measured force (the
 //! *haptic mismatch*), and moves the mesh until the two agree.
 //!
-//! This crate is the ROS 2 node and the command line; the rest is in crates of its own, shown here
+//! This crate is the ROS 2 node and the command line; crates of their own hold the rest, shown here
 //! under one name:
 //!
 //! | crate | modules |
@@ -13,11 +13,11 @@
 //! | [`touchup_sim`] | [`sim`]: known surfaces, a scanner, a stylus and an arm to test against |
 //! | [`touchup_io`] | [`io`]: mesh files, recordings, tables, pictures |
 //! | [`touchup_session`] | [`clock`], [`threads`], [`scan`], [`scene`], [`replay`], [`refinement`], [`calibration`], [`input_check`], [`live`], [`session`], [`sweep`] |
-//! | `touchup-report` | a program of its own: error against run time, stability, and what each part costs |
+//! | `touchup-report` | a separate program: error against run time, stability, and the cost of each part |
 //! | this one | `inspection`: a part against its drawing; `html`: text within pages; `ros`: the node (features `ros` and `r2r`); `ros2_control`: an arm behind it; `ur` (feature `ur`): a UR; [`cli`]: one file for each verb |
 #![cfg_attr(not(test), warn(clippy::unwrap_used))]
 
-/// The method as docs/method.md has it; its code is tested.
+/// The method of docs/method.md, as tested code.
 #[cfg(doctest)]
 #[doc = include_str!("../docs/method.md")]
 struct MethodPage;
@@ -41,7 +41,7 @@ pub mod ros2_control;
 #[cfg(feature = "ur")]
 pub mod ur;
 
-/// The features that the program can be built with, and whether it was.
+/// Optional cargo features, and whether this build has them.
 pub const FEATURES: [(&str, bool); 4] = [
     ("feature ros", cfg!(feature = "ros")),
     ("feature r2r", cfg!(feature = "r2r")),
@@ -49,7 +49,7 @@ pub const FEATURES: [(&str, bool); 4] = [
     ("feature web", cfg!(feature = "web")),
 ];
 
-// the model of a UR's controller is that of the stand-in, which uses this crate by its name
+// the stand-in supplies the model of a UR's controller and uses this crate by its name
 #[cfg(all(test, feature = "ur"))]
 extern crate self as touchup;
 

@@ -1,5 +1,5 @@
-//! Lines of the log for who passes them on, as the node does to `/rosout`: a bounded queue, from
-//! which a place in the program that repeats itself takes one line in a second.
+//! Log lines for consumers such as the node, which forwards them to `/rosout`: a bounded queue that
+//! takes one line per second from each place in the program.
 
 use std::collections::BTreeMap;
 use std::fmt::{Debug, Write};
@@ -12,45 +12,45 @@ use tracing::{Event, Level, Subscriber};
 use tracing_subscriber::Layer;
 use tracing_subscriber::layer::Context;
 
-/// Lines that wait at most; later ones are lost, as stderr has them.
+/// Most waiting lines; later ones reach stderr alone.
 const MOST_WAITING: usize = 256;
-/// One place in the program says one line in so long.
+/// Least time between lines of one place in the program.
 const EVERY: Duration = Duration::from_secs(1);
-/// A longer line is cut off, bytes.
+/// Longest line before truncation, bytes.
 const LONGEST: usize = 2000;
 
 /// A line of the log.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LogLine {
-    /// how grave it is
+    /// severity
     pub level: Level,
-    /// what it says, with its fields behind it
+    /// message, with its fields behind it
     pub text: String,
-    /// file of the place in the program
+    /// source file
     pub file: &'static str,
-    /// … and its line
+    /// source line
     pub line: u32,
 }
 
-/// Who listens; nobody does before [`listen`].
+/// The listener; none before [`listen`].
 static LISTENER: Mutex<Option<SyncSender<LogLine>>> = Mutex::new(None);
 
-/// From now on lines come here, and to nobody who listened before.
+/// Directs later lines to this receiver, and no longer to an earlier one.
 pub fn listen() -> Receiver<LogLine> {
     let (to, lines) = sync_channel(MOST_WAITING);
     *locked(&LISTENER) = Some(to);
     lines
 }
 
-/// Locks it. What is in it is whole whoever held it.
+/// Locks; the content is whole even after a panic.
 fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Passes lines of this program on, not those of the libraries below.
+/// Forwards lines of this program, without those from libraries.
 #[derive(Debug, Default)]
 pub struct LogLines {
-    /// when a place said something last, by file and line
+    /// time of the last line of each place, by file and line
     said: Mutex<BTreeMap<(&'static str, u32), Instant>>,
 }
 
@@ -84,7 +84,7 @@ impl<S: Subscriber> Layer<S> for LogLines {
             .find(|&at| said.is_char_boundary(at));
         said.truncate(whole.unwrap_or(0));
         let (file, line) = place;
-        // nobody waits for room
+        // drops the line if the queue is full
         let _ = listener.try_send(LogLine {
             level: *about.level(),
             text: said,
@@ -94,7 +94,7 @@ impl<S: Subscriber> Layer<S> for LogLines {
     }
 }
 
-/// The words of an event, and its fields.
+/// Message of an event, and its fields.
 #[derive(Default)]
 struct LineText {
     said: String,
@@ -118,7 +118,7 @@ mod tests {
 
     use super::*;
 
-    /// One test for all: there is one listener in the program.
+    /// A single test, as the program has a single listener.
     #[test]
     fn lines_of_this_program_come_with_their_fields_and_what_repeats_itself_comes_once() {
         let lines = listen();

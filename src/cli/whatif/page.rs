@@ -1,4 +1,4 @@
-//! The page: one file of HTML without scripts, which asks for nothing outside of it.
+//! The page: one HTML file without scripts or external resources.
 
 use std::io;
 
@@ -12,12 +12,12 @@ use crate::io::png::png_bytes;
 use crate::mesh::TriMesh;
 use crate::sweep::{COVERAGE as K, FeatureChange, JobResult, NumberChange, WhatIf};
 
-/// Of a picture, pixels.
+/// Width of a picture, pixels.
 const WIDTH: u32 = 1000;
-/// What did not move.
+/// Colour of unmoved places.
 const STILL: Rgb = [222, 225, 230];
-/// Where the colours change, in ±; each with that of what went inwards and of what came outwards.
-/// The colour-blind tell them apart.
+/// Thresholds of the colours, in ±; each with the inward and the outward colour. The colour-blind
+/// tell them apart.
 const STEPS: [(f64, Rgb, Rgb); 3] = [
     (1.0, [146, 190, 224], [247, 186, 142]),
     (2.0, [64, 122, 188], [224, 112, 70]),
@@ -272,7 +272,7 @@ fn rows(feature: &FeatureChange) -> Vec<Markup> {
         let known = plus_minus.map_or("not known".to_owned(), |known| fixed(known, 3));
         let cells = [what, value(a), value(b), format!("{change} {unit}"), known];
         html! {
-            // the feature keeps its name and place
+            // the first line has the feature's name and place
             @if at == 0 { (begin) } @else { td {} td {} }
             @for cell in cells {
                 td { @if *moved { (cell) } @else { span.still { (cell) } } }
@@ -283,7 +283,7 @@ fn rows(feature: &FeatureChange) -> Vec<Markup> {
     numbers.iter().enumerate().map(row).collect()
 }
 
-/// A number without its unit, and its unit.
+/// Name of a number without its unit, and the unit.
 fn in_words(name: &str) -> (String, &'static str) {
     let (what, unit) = match name.rsplit_once('_') {
         Some((what, "mm")) => (what, "mm"),

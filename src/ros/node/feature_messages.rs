@@ -1,4 +1,4 @@
-//! Features as messages, as labels, and as something to look at.
+//! Features as messages, labels and markers.
 
 use nalgebra::{Point3, Rotation3, UnitQuaternion, Vector3};
 
@@ -18,20 +18,20 @@ const AT_95_PERCENT: f64 = 1.96;
 const LETTERS: f64 = 3e-3;
 /// Width of lines, m.
 const LINE: f64 = 0.6e-3;
-/// So far off the surface it does not show through in spots, m.
+/// Distance off the surface that prevents spots of it from showing through, m.
 const CLEAR: f64 = 0.1e-3;
 
-/// Number of a kind in messages; `None` is a region of which nobody knows what it is.
+/// Message number of a kind; `None` is a region of unknown kind.
 pub fn number_of(kind: Option<Kind>) -> u8 {
     kind.map_or(FeatureMsg::KIND_UNKNOWN, |kind| {
         FeatureMsg::KIND_HOLE + kind as u8
     })
 }
 
-/// Kind of a number in messages.
+/// Kind by message number.
 ///
 /// # Errors
-/// In words, when no kind has this number.
+/// In words, if no kind has this number.
 pub fn kind_of(number: u8) -> Result<Option<Kind>, String> {
     let mut kinds = std::iter::once(None).chain(Kind::ALL.into_iter().map(Some));
     let most = KIND_NAMES.len() - 1;
@@ -40,10 +40,10 @@ pub fn kind_of(number: u8) -> Result<Option<Kind>, String> {
         .ok_or_else(|| format!("there is no kind {number}: 0 to {most} are"))
 }
 
-/// A feature that was found.
+/// A detected feature.
 ///
-/// - `id`: the number by which it is known.
-/// - `search_radius`: how far around it was looked when somebody flagged it, m.
+/// - `id`: its number in messages.
+/// - `search_radius`: radius of the search around the user's flag, m.
 pub fn found(feature: &Feature, id: u32, search_radius: Option<f64>) -> FeatureMsg {
     let yes_no = |known: Option<bool>| match known {
         None => FeatureMsg::UNKNOWN,
@@ -95,7 +95,7 @@ pub fn found(feature: &Feature, id: u32, search_radius: Option<f64>) -> FeatureM
     message
 }
 
-/// How far a feature is off its ideal form.
+/// Deviations of a feature from its ideal form.
 fn form_deviations(form: &Form) -> Vec<FormDeviation> {
     let round = form.round();
     form.deviations()
@@ -116,9 +116,9 @@ fn form_deviations(form: &Form) -> Vec<FormDeviation> {
         .collect()
 }
 
-/// How a feature lies to another.
+/// Relation of a feature to another.
 ///
-/// - `name_of`: the number by which a feature is known that the detector numbers so.
+/// - `name_of`: a feature's number in messages, by the detector's number.
 pub fn related(relation: &Relation, name_of: impl Fn(u32) -> u32) -> RelationMsg {
     let [zone, angle, distance, concentricity] = [
         relation.zone,
@@ -147,7 +147,7 @@ pub fn related(relation: &Relation, name_of: impl Fn(u32) -> u32) -> RelationMsg
     }
 }
 
-/// A place that somebody pointed at, where nothing was found yet.
+/// A flagged place without a detected feature yet.
 pub fn flagged(flag: &Flag) -> FeatureMsg {
     FeatureMsg {
         kind: number_of(flag.kind),
@@ -157,7 +157,7 @@ pub fn flagged(flag: &Flag) -> FeatureMsg {
     }
 }
 
-/// What it is and its size at 95 %, mm: "hole Ø8.02 ± 0.04".
+/// Kind and size at 95 %, mm: "hole Ø8.02 ± 0.04".
 pub fn label(feature: &FeatureMsg) -> String {
     let kind = KIND_NAMES
         .get(usize::from(feature.kind))
@@ -188,7 +188,7 @@ pub fn label(feature: &FeatureMsg) -> String {
     }
 }
 
-/// All features to look at; what was shown before goes.
+/// Markers of all features; they replace earlier ones.
 pub fn markers(features: &FeatureArray) -> MarkerArray {
     let frame = &features.header;
     let mut markers = vec![Marker {
@@ -231,7 +231,7 @@ pub fn markers(features: &FeatureArray) -> MarkerArray {
     MarkerArray { markers }
 }
 
-/// A ball to look at.
+/// A ball marker.
 pub fn ball(centre: Point, diameter: f64, base: Marker) -> Marker {
     Marker {
         r#type: Marker::SPHERE,
@@ -248,7 +248,7 @@ pub fn ball(centre: Point, diameter: f64, base: Marker) -> Marker {
     }
 }
 
-/// Words to look at.
+/// A text marker.
 pub fn letters(place: &Point3<f64>, text: String, color: ColorRGBA, base: Marker) -> Marker {
     Marker {
         r#type: Marker::TEXT_VIEW_FACING,
@@ -266,7 +266,7 @@ pub fn letters(place: &Point3<f64>, text: String, color: ColorRGBA, base: Marker
     }
 }
 
-/// A part has dozens of edges and planes: those speak for themselves.
+/// Edges, corners and planes have no label: a part has dozens of them.
 fn has_label(feature: &FeatureMsg) -> bool {
     !matches!(
         feature.kind,
@@ -274,8 +274,8 @@ fn has_label(feature: &FeatureMsg) -> bool {
     ) || feature.status == FeatureMsg::STATUS_FLAGGED
 }
 
-/// Red, green, blue of what is flagged, fitted to touches, and found on the mesh. None of them is a
-/// colour of the mesh, in front of which they are.
+/// Red, green, blue of flagged features, fits to touches, and features of the mesh. None is a
+/// colour of the mesh behind them.
 pub(super) const COLOURS: [[f32; 3]; 3] = [[0.64, 0.01, 0.52], [0.1, 0.3, 1.0], [0.2, 0.95, 1.0]];
 
 fn colour(feature: &FeatureMsg) -> ColorRGBA {
@@ -304,7 +304,7 @@ fn body(feature: &FeatureMsg, base: &Marker) -> Option<Marker> {
 }
 
 fn outline(feature: &FeatureMsg, base: &Marker) -> Marker {
-    // an edge has the surface on two sides, of an opening it is all below
+    // an edge has surface on two sides, an opening below
     let up = if feature.kind == FeatureMsg::KIND_EDGE {
         Vector3::zeros()
     } else {
@@ -326,7 +326,7 @@ fn outline(feature: &FeatureMsg, base: &Marker) -> Marker {
     }
 }
 
-/// Up, where it has none.
+/// Axis of a feature; up if it has none.
 fn axis_of(feature: &FeatureMsg) -> Vector3<f64> {
     let axis = vector_of(&feature.axis);
     if axis.iter().all(|x| x.is_finite()) {
@@ -343,8 +343,8 @@ fn cylinder(feature: &FeatureMsg, base: &Marker) -> Marker {
     } else {
         feature.depth
     };
-    // a hole goes down from its opening and is seen inside of it, a boss up from its foot and is
-    // seen around it
+    // a hole goes down from its opening and is visible inside, a boss up from its foot and is
+    // visible outside
     let (side, up) = if feature.kind == FeatureMsg::KIND_BOSS {
         (1.0, 0.5)
     } else {
