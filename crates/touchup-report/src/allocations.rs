@@ -1,4 +1,4 @@
-//! Allocated bytes, counted for each thread.
+//! Allocated bytes, counted per thread.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -7,24 +7,24 @@ thread_local! {
     static ASKED: Cell<AllocationCounts> = const { Cell::new(AllocationCounts { requests: 0, bytes: 0 }) };
 }
 
-/// Bytes allocated by one thread since it began.
+/// Allocations of one thread since its start.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct AllocationCounts {
-    /// how often
+    /// number of requests
     pub requests: u64,
-    /// for how much in all, bytes
+    /// requested bytes in all
     pub bytes: u64,
 }
 
-/// The system's allocator, which also counts. A program that wants the counts names it as its
-/// global allocator; an allocation costs an addition more then, and a program that does not
-/// allocate nothing.
+/// The system's allocator with counters. A program that needs the counts names it as its global
+/// allocator; an allocation then costs one more addition, a program without allocations pays
+/// nothing.
 #[derive(Clone, Copy, Debug)]
 pub struct CountingAllocator;
 
 impl CountingAllocator {
     fn note(size: usize) {
-        // a thread that ends has no counter any more
+        // an ending thread has no counter
         let _ = ASKED.try_with(|asked| {
             let AllocationCounts { requests, bytes } = asked.get();
             asked.set(AllocationCounts {
@@ -57,7 +57,7 @@ unsafe impl GlobalAlloc for CountingAllocator {
     }
 }
 
-/// Bytes allocated by this thread so far; `None` where the program does not count.
+/// Bytes allocated by this thread; `None` if the program does not count.
 pub fn asked() -> Option<AllocationCounts> {
     let before = ASKED.get();
     drop(std::hint::black_box(Box::new(0u8)));

@@ -32,7 +32,7 @@ use touchup_session::scene::{Scene, SceneError};
 
 use crate::environment::{PeersError, peers};
 
-/// Why there is no report.
+/// Reason for a missing report.
 #[derive(Debug, thiserror::Error)]
 pub enum CommandError {
     #[error("{0}; see --help")]
@@ -59,7 +59,7 @@ pub enum CommandError {
 }
 
 impl CommandError {
-    /// As those of `touchup`.
+    /// Exit codes as in `touchup`.
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Write { .. } | Self::Report(_) | Self::Peers(_) | Self::Cost(_) => 1,
@@ -197,7 +197,7 @@ pub fn report(arguments: &ReportArguments) -> Result<(), CommandError> {
             out.join("report.html").display()
         )
     };
-    // a reader that has gone away is no error of ours
+    // a closed pipe is no error here
     let _ = writeln!(stdout(), "{text}");
     Ok(())
 }
@@ -223,7 +223,7 @@ impl ReportArguments {
         };
         let is_wanted = |part| self.only.is_empty() || self.only.contains(&part);
         let given = self.given()?;
-        // first, for they need what may not be there, and nothing measured is lost by that
+        // first, as they need software that may be missing: a failure then loses no measurement
         let environment = self.peers_env.clone();
         let environment = environment.unwrap_or_else(|| self.out.join("peers-env"));
         let peers = self.peers.then(|| peers(effort, &environment, progress));
@@ -280,7 +280,7 @@ impl ReportArguments {
         Ok(())
     }
 
-    /// The case that is given by files.
+    /// The case from the user's files.
     fn given(&self) -> Result<Option<GivenPart>, CommandError> {
         let (Some(scan), Some(truth), Some(bag)) = (&self.scan, &self.truth, &self.bag) else {
             return Ok(None);
@@ -322,7 +322,7 @@ impl ReportArguments {
     }
 }
 
-/// A line with the time that has passed, for each longer piece of work.
+/// Prints a line with the elapsed time for each longer piece of work.
 fn lines_on_stderr() -> impl FnMut(&str) {
     let started = Instant::now();
     move |what| {
@@ -334,7 +334,7 @@ fn lines_on_stderr() -> impl FnMut(&str) {
     }
 }
 
-/// As it could be called again.
+/// The command line for a repeated call.
 fn command() -> String {
     let arguments = std::env::args_os().skip(1);
     let arguments = arguments.map(|word| word.to_string_lossy().into_owned());

@@ -1,5 +1,5 @@
-//! The numbers behind figures and tables as comma-separated values: every number to its last digit,
-//! nothing for what is not finite.
+//! Numbers behind figures and tables as comma-separated values: every number to its last digit,
+//! empty if not finite.
 
 use touchup_page::figure::{Drawing, Figure};
 
@@ -53,7 +53,7 @@ pub fn of_table(table: &Table) -> String {
 
 /// Heads, and a line for each row.
 ///
-/// - `heads`: each with whether it has a spread, whose columns are named after it and `separator`.
+/// - `heads`: each with whether it has a spread; `separator` ends the head in its column names.
 fn lines(
     heads: &[(&str, bool)],
     separator: &str,

@@ -11,18 +11,17 @@ use super::table::{Chapter, Table};
 pub struct Report {
     /// processor, cores, memory, system
     pub machine: String,
-    /// of the program that measured; "unknown" where it was built without its repository
+    /// commit of the measuring program; "unknown" in a build without its repository
     pub commit: String,
     /// the command line
     pub command: String,
     /// day and time in UTC
     pub date: String,
-    /// what a practitioner should take from it: use this, because, cost; `None` where too little
-    /// was measured to say
+    /// advice to a practitioner: choice, reason, cost; `None` if the measurements are too few
     pub advice: Option<Table>,
-    /// what each part found, a paragraph each
+    /// findings of each part, a paragraph each
     pub verdict: Vec<String>,
-    /// its parts, in order
+    /// chapters, in order
     pub chapters: Vec<Chapter>,
 }
 
@@ -37,7 +36,7 @@ impl Report {
             .chain(self.chapters.iter().flat_map(|chapter| &chapter.tables))
     }
 
-    /// What every picture says about where it is from.
+    /// Provenance text of every picture.
     pub(super) fn provenance(&self) -> String {
         format!(
             "{} · commit {} · {}",

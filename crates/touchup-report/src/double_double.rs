@@ -1,5 +1,5 @@
-//! Numbers of 32 digits as a sum of two doubles \[Dekker 1971\], with what the closed forms need:
-//! an independent method for the same answer.
+//! Numbers of 32 digits as a sum of two doubles \[Dekker 1971\], with the operations of the closed
+//! forms: an independent method for the same answer.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -15,7 +15,7 @@ const LN_2: Double2 = Double2 {
     high: std::f64::consts::LN_2,
     low: 2.319_046_813_846_299_6e-17,
 };
-/// The argument of the series of the exponential is halved so often.
+/// Halvings of the argument of the exponential series.
 const HALVINGS: i32 = 9;
 /// Terms of that series: (ln 2 / 1024)¹² / 12! is 2e-47.
 const TERMS: u32 = 11;
@@ -89,7 +89,7 @@ impl Div for Double2 {
 }
 
 impl Double2 {
-    /// e to this power; of at most 700.
+    /// The exponential; the argument is at most 700.
     pub fn exp(self) -> Self {
         let twos = (self.high / LN_2.high).round();
         let small = self - LN_2 * twos.into();
@@ -117,7 +117,7 @@ impl Double2 {
         }
     }
 
-    /// Natural logarithm; of a positive number.
+    /// Natural logarithm of a positive number.
     pub fn ln(self) -> Self {
         let mut y = Self::from(self.high.ln());
         // Newton's method for e^y = x doubles the digits
@@ -127,7 +127,7 @@ impl Double2 {
         y
     }
 
-    /// Square root; of a number that is not negative.
+    /// Square root of a nonnegative number.
     pub fn sqrt(self) -> Self {
         let root = self.high.sqrt();
         if root == 0.0 {

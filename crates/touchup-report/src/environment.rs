@@ -9,13 +9,13 @@ use touchup_io::atomic::write_atomically;
 use touchup_report::Effort;
 use touchup_report::peers::{PACKAGES, Peers, PeersAtSize, PeersInput, SCRIPT, UnknownLine};
 
-/// Why the peers could not be measured.
+/// Error of the measurement of the peers.
 #[derive(Debug, thiserror::Error)]
 pub enum PeersError {
-    /// The interpreter, the environment or the packages.
+    /// Failure of the interpreter, the environment or the packages.
     #[error("{command}: {reason}; --peers needs python3 with venv, and PyPI the first time")]
     Setup { command: String, reason: String },
-    /// The script ended without having measured.
+    /// The script ended without a measurement.
     #[error("the peers' script failed: {0}")]
     Script(String),
     #[error(transparent)]
@@ -29,9 +29,9 @@ pub enum PeersError {
     Touchup(#[from] RefineError),
 }
 
-/// Measures touchup and the peers in turns, on 100k faces and, unless it is to be quick, on 1M.
+/// Measures touchup and the peers in turns, on 100k faces and, unless quick, on 1M.
 ///
-/// `environment`: folder of the virtual environment; made and filled where it is not yet.
+/// `environment`: folder of the virtual environment; created and filled if missing.
 pub fn peers(
     effort: Effort,
     environment: &Path,
@@ -61,7 +61,7 @@ pub fn peers(
     })
 }
 
-/// The interpreter of an environment that has the packages.
+/// The interpreter of an environment with the packages.
 fn make_environment(folder: &Path) -> Result<PathBuf, PeersError> {
     let python = folder.join("bin/python");
     if !python.exists() {
@@ -91,7 +91,7 @@ fn set_up(command: &mut Command) -> Result<(), PeersError> {
     })
 }
 
-/// What a program printed, or the last line that it said before it failed.
+/// Output of a program, or its last line before a failure.
 fn run(command: &mut Command) -> Result<String, String> {
     let output = command.output().map_err(|error| error.to_string())?;
     if output.status.success() {

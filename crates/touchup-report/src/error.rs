@@ -9,37 +9,37 @@ use touchup_session::replay::ReplayError;
 use touchup_session::scene::SceneError;
 use touchup_sim::SimError;
 
-/// What was measured, or why it was not.
+/// A measurement, or its error.
 pub type Measured<T> = Result<T, MeasureError>;
 
-/// Why something was not measured.
+/// Reason for a missing measurement.
 #[derive(Debug, thiserror::Error)]
 pub enum MeasureError {
-    /// A simulated surface or stylus.
+    /// Error of a simulated surface or stylus.
     #[error(transparent)]
     Sim(#[from] SimError),
-    /// A mesh that cannot be: a plate, or a patch that is too large.
+    /// Impossible mesh: a plate, or a patch that is too large.
     #[error(transparent)]
     Mesh(#[from] MeshError),
-    /// A setting of a given part, or of a stage.
+    /// Setting of a given part, or of a stage.
     #[error(transparent)]
     Setting(#[from] SettingError),
-    /// A push.
+    /// Error of a push.
     #[error(transparent)]
     Refine(#[from] RefineError),
-    /// An engine that could not be built.
+    /// Error of the engine's construction.
     #[error(transparent)]
     Engine(#[from] LiveError),
-    /// A scan that cannot be compared with the part.
+    /// The scan is not comparable with the part.
     #[error(transparent)]
     Compare(#[from] CompareError),
-    /// A scene.
+    /// Error of a scene.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// The recording that is replayed.
+    /// Error of the replayed recording.
     #[error(transparent)]
     Recording(#[from] ReplayError),
-    /// Nowhere to put it.
+    /// No temporary folder for the recording.
     #[error("no temporary folder for a recording: {0}; name one with room by TMPDIR")]
     Folder(std::io::Error),
     /// A scene without `refine`.
@@ -50,12 +50,12 @@ pub enum MeasureError {
     /// No block of samples.
     #[error("nothing was timed: the raster of the ball is not on the plate, or has no samples")]
     NothingTimed,
-    /// A given part that is not there where it is touched.
+    /// The given part is absent at its touches.
     #[error("none of the {samples} samples of {name} touches the part: are they in its frame?")]
     NothingTouched {
-        /// of the case
+        /// name of the case
         name: String,
-        /// how many there are
+        /// number of samples
         samples: usize,
     },
 }

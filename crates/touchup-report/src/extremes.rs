@@ -8,10 +8,10 @@ use super::{Chapter, Table};
 pub use case::Extreme;
 use itertools::Itertools;
 
-/// All of them.
+/// All extremes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Extremes {
-    /// on one face, then on meshes
+    /// rows on one face, then on meshes
     pub rows: Vec<Extreme>,
 }
 
@@ -23,7 +23,7 @@ pub fn extremes() -> Extremes {
 }
 
 impl Extremes {
-    /// Those with a wrong answer.
+    /// Extremes with a wrong answer.
     pub fn wrong(&self) -> impl Iterator<Item = &Extreme> {
         self.rows.iter().filter(|row| !row.is_right)
     }
@@ -40,7 +40,7 @@ impl Extremes {
         Chapter::of("Extremes", vec![verdict], vec![], vec![self.table()])
     }
 
-    /// One line for each.
+    /// One line for each extreme.
     pub fn table(&self) -> Table {
         Table::of("extremes", "Extremes", &self.rows)
             .column("fed", |row| row.fed.as_str())

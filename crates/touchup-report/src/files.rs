@@ -1,4 +1,4 @@
-//! The files that a report is handed over as.
+//! Output files of a report.
 
 use std::collections::BTreeSet;
 
@@ -6,10 +6,10 @@ use super::document::Report;
 use super::{csv, page};
 use touchup_page::{ChartSize, Looks, printable};
 
-/// Why a report cannot be written down.
+/// Error of writing a report.
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
-    /// Two figures or tables would take one file.
+    /// Two figures or tables have the same file name.
     #[error("two figures or tables are called {0}")]
     SameName(String),
     /// A name that is no plain file name.
@@ -23,17 +23,17 @@ pub enum ReportError {
 /// One file of a report.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct OutputFile {
-    /// without folder
+    /// file name without folder
     pub name: String,
-    /// what is in it
+    /// content
     pub bytes: Vec<u8>,
 }
 
 impl Report {
-    /// `report.html`, `report.json`, and of each figure its SVG and CSV, of each table its CSV.
+    /// `report.html`, `report.json`, SVG and CSV of each figure, CSV of each table.
     ///
     /// # Errors
-    /// [`ReportError`]: names that are not plain, or there twice.
+    /// [`ReportError`]: invalid or duplicate names.
     pub fn files(&self) -> Result<Vec<OutputFile>, ReportError> {
         self.check_names()?;
         let provenance = self.provenance();

@@ -1,8 +1,8 @@
-//! Error against run time, stability, what each part costs, and whether stated uncertainties hold:
-//! everything that `touchup-report` measures and shows.
+//! Error against run time, stability, cost of each part, and validity of stated uncertainties: the
+//! measurements and displays of `touchup-report`.
 //!
-//! Each part measures into a type of its own, writes it as a [`Chapter`], and returns what the
-//! verdict needs.
+//! Each part measures into a type of its own, writes it as a [`Chapter`], and returns its share of
+//! the verdict.
 #![cfg_attr(not(test), warn(clippy::unwrap_used))]
 
 pub mod allocations;
@@ -30,21 +30,21 @@ pub use touchup_page::figure::{
     Axis, Drawing, Figure, LineStroke, Mark, Panel, Scale, Series, Spread,
 };
 
-/// How much is measured.
+/// Extent of the measurements.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Effort {
-    /// the small report: under a minute where the whole one takes up to twenty-five
+    /// the small report: under a minute instead of up to twenty-five
     pub is_quick: bool,
 }
 
 impl Effort {
-    /// One of two, by how much is measured.
+    /// The value for the extent of the measurements.
     pub fn choose<T>(self, quick: T, full: T) -> T {
         if self.is_quick { quick } else { full }
     }
 }
 
-/// Seconds that some work takes, and its result.
+/// Run time of some work in seconds, and its result.
 fn timed<T>(work: impl FnOnce() -> T) -> (f64, T) {
     let started = std::time::Instant::now();
     let result = std::hint::black_box(work());

@@ -1,5 +1,5 @@
-//! One held sample solved in numbers of 32 digits, by an independent method: what each step of the
-//! face dynamics is compared with.
+//! One held sample solved in numbers of 32 digits, by an independent method: the reference for each
+//! step of the face dynamics.
 //!
 //! In the plane of normal and force, with the exponent x = β|F| ∫ f dt for the second unknown,
 //!
@@ -7,8 +7,8 @@
 //! ds/dt = α (|F| cos θ − f)      dx/dt = β |F| f      tan(θ/2) = tan(θ₀/2) e^−x      n = cos θ F̂ + sin θ ê
 //! ```
 //!
-//! by collocation at the seven points of Radau IIA, of order 13 \[Hairer Wanner 1999\], each
-//! stretch of time halved until one step and two half steps agree.
+//! by collocation at the seven points of Radau IIA, of order 13 \[Hairer Wanner 1999\]; halves each
+//! time interval until one step and two half steps agree.
 
 use std::sync::LazyLock;
 
@@ -24,17 +24,17 @@ const AGREEMENT: f64 = 1e-17;
 /// Newton's method stops at this share of the size of the unknown.
 const CONVERGED: f64 = 1e-24;
 const MOST_ITERATIONS: usize = 30;
-/// Steps, accepted or not, after which a path counts as one that cannot be followed.
+/// Most steps, accepted or not; a longer path counts as failed.
 const MOST_STEPS: usize = 4_000;
 /// A step times the rate of growth within it.
 const LONGEST_GROWTH: f64 = 2.0;
-/// Exponentials of more are too near to the largest number.
+/// Largest exponent without overflow risk.
 const LARGEST_EXPONENT: f64 = 690.0;
 
-/// A face and the sample that it is held against.
+/// A face and its held sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HeldFace {
-    /// α, β, the contact model and the direction of motion; no rigid offset is taken out
+    /// α, β, the contact model and the direction of motion; the rigid offset stays in
     pub params: DynamicsParams,
     /// n* at the start, and n*(0)
     pub normal: Vector3<f64>,
@@ -42,21 +42,21 @@ pub struct HeldFace {
     pub arm: Vector3<f64>,
     /// F on the stylus, N
     pub force: Vector3<f64>,
-    /// how long the sample holds, s
+    /// hold time of the sample, s
     pub dt_s: f64,
 }
 
-/// Where the face is at the end.
+/// Final state of the face.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reference {
-    /// barycentre from that at the start, m, and normal
+    /// barycentre relative to its start, m, and normal
     pub face: FaceState,
     /// farthest travel on the way, m
     pub farthest_m: f64,
 }
 
 impl HeldFace {
-    /// The solution; `None` where the path could not be followed, or has no bound.
+    /// The solution; `None` if the path fails or is unbounded.
     pub fn reference(&self) -> Option<Reference> {
         let plane = ForcePlane::of(self)?;
         let (travel, exponent, farthest_m) = plane.follow(self.dt_s)?;
@@ -87,7 +87,7 @@ fn dot(a: &Wide3, b: &Wide3) -> Double2 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// Length, and direction; zero where there is none.
+/// Length, and direction; zero for a zero vector.
 fn split(a: &Wide3) -> (Double2, Wide3) {
     let length = dot(a, a).sqrt();
     if length.high == 0.0 {
@@ -236,7 +236,7 @@ impl<'a> ForcePlane<'a> {
     fn follow(&self, end: f64) -> Option<(Double2, Double2, f64)> {
         let zero = Double2::from(0.0);
         let (mut y, mut time, mut farthest) = ([zero, zero], zero, 0.0_f64);
-        // a start too short to do much, by every time constant
+        // first step short against every time constant
         let (rate, jacobian) = self.rate(&y);
         let length = match self.held.params.model {
             ContactModel::Sigmoid { h_min_m, .. } => h_min_m,
@@ -283,7 +283,7 @@ impl<'a> ForcePlane<'a> {
         None
     }
 
-    /// A step of collocation; `None` where Newton's method does not converge.
+    /// A step of collocation; `None` if Newton's method does not converge.
     fn step(&self, y: &Pair, dt: f64, size: &impl Fn(&Pair) -> [f64; 2]) -> Option<Pair> {
         let weights = &*WEIGHTS;
         let mut z = [[Double2::from(0.0); 2]; STAGES];
@@ -302,7 +302,7 @@ impl<'a> ForcePlane<'a> {
                 }
                 (0..2).for_each(|k| residual[2 * i + k] = sum[k].value());
             }
-            // an implicit method damps what grows, where the step is long
+            // an implicit method damps growth in long steps
             let growth = slopes
                 .iter()
                 .map(|(_, jacobian)| growth(jacobian))
@@ -416,8 +416,8 @@ fn nodes() -> [Double2; STAGES] {
 mod tests {
     use super::*;
 
-    /// Of three digits only the known first and last: the points for s = 7 are those of the table,
-    /// their weights those of a quadrature that is exact for polynomials up to order 12.
+    /// The last row of weights is a quadrature at the points for s = 7, exact for polynomials up to
+    /// degree 12.
     #[test]
     fn the_last_row_integrates_polynomials_of_degree_twelve() {
         let nodes = nodes();

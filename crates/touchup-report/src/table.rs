@@ -11,13 +11,13 @@ pub enum TableCell {
     Text(String),
     /// a number in the unit of its column, shown with three digits
     Number(f64),
-    /// the median is shown, with its spread
+    /// a median with its spread
     Spread(Spread),
-    /// nothing to say
+    /// no content
     Empty,
 }
 
-/// What a cell is made of.
+/// Conversions into cells.
 macro_rules! cells_of {
     ($($value:ty => $cell:expr,)*) => {$(
         impl From<$value> for TableCell {
@@ -47,18 +47,18 @@ impl<T: Into<TableCell>> From<Option<T>> for TableCell {
 pub struct Table {
     /// file name of its CSV, without ending
     pub id: String,
-    /// above it
+    /// heading above the table
     pub title: String,
-    /// below it
+    /// text below the table
     pub caption: String,
-    /// one a column, with the unit: "push, µs"
+    /// one per column, with the unit: "push, µs"
     pub heads: Vec<String>,
-    /// one a line, each as long as `heads`
+    /// one per line, each as long as `heads`
     pub rows: Vec<Vec<TableCell>>,
 }
 
 impl Table {
-    /// Begins a table of these rows; its columns come one by one, its caption last.
+    /// Starts a table of these rows; columns follow one by one, the caption last.
     pub fn of<R: Copy>(id: &str, title: &str, rows: impl IntoIterator<Item = R>) -> TableOf<R> {
         let [id, title] = [id, title].map(str::to_owned);
         let rows: Vec<R> = rows.into_iter().collect();
@@ -83,7 +83,7 @@ pub struct TableOf<R> {
 }
 
 impl<R: Copy> TableOf<R> {
-    /// Adds a column: its head with the unit, and what it shows of each row.
+    /// Adds a column: its head with the unit, and its value of each row.
     #[must_use]
     pub fn column<C: Into<TableCell>>(
         mut self,
@@ -97,7 +97,7 @@ impl<R: Copy> TableOf<R> {
         self
     }
 
-    /// The table, with what is below it.
+    /// The table with the text below it.
     pub fn caption(self, caption: impl Into<String>) -> Table {
         Table {
             caption: caption.into(),
@@ -106,12 +106,12 @@ impl<R: Copy> TableOf<R> {
     }
 }
 
-/// One part of the report.
+/// One chapter of the report.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Chapter {
-    /// its number and name
+    /// number and name
     pub title: String,
-    /// what was done and what it says, a paragraph each, in plain words
+    /// procedure and result, a paragraph each, in plain words
     pub text: Vec<String>,
     /// pictures, in order
     pub figures: Vec<Figure>,
@@ -120,7 +120,7 @@ pub struct Chapter {
 }
 
 impl Chapter {
-    /// Of its parts, in order.
+    /// A chapter of these parts, in order.
     pub fn of(title: &str, text: Vec<String>, figures: Vec<Figure>, tables: Vec<Table>) -> Self {
         Self {
             title: title.to_owned(),

@@ -1,5 +1,5 @@
-//! The practitioner's questions, answered by the measurements: which mode, step and region, at
-//! which rate, what it costs, and where it fails.
+//! The practitioner's questions, answered by the measurements: mode, step and region, rate, cost,
+//! and limits.
 
 use super::convergence::{Convergence, Rule};
 use super::cost::{Cost, RecordingCost};
@@ -13,8 +13,8 @@ use crate::Table;
 use itertools::Itertools;
 use touchup_page::number::three_digits;
 
-/// Method and region, step, rate and limits, each with its reason and its cost; `None` where no
-/// method made any scan better.
+/// Method and region, step, rate and limits, each with its reason and its cost; `None` if no method
+/// improved any scan.
 pub fn advice(
     scans: &WholeScan,
     stability: Option<&Stability>,
@@ -101,7 +101,7 @@ struct MethodChoice<'a> {
     before_mm: f64,
 }
 
-/// The method on each part where there is one.
+/// The chosen method of each part, if any.
 fn by_part<'a>(
     scans: &'a WholeScan,
     result: impl Fn(&'a ScanResult) -> Option<&'a MethodResult>,
@@ -117,7 +117,7 @@ fn by_part<'a>(
     scans.cases.iter().filter_map(choice).collect()
 }
 
-/// The method, where it is the same on every part, else each with its part.
+/// The method, if it is the same on every part, else each with its part.
 fn one_or_each(choices: &[MethodChoice<'_>]) -> String {
     match choices {
         [first, ..]
@@ -185,7 +185,7 @@ fn of_case(case: &CaseResult) -> Option<String> {
     Some(text)
 }
 
-/// How many sweeps it takes, and how often the published rule blows up.
+/// Counts of blow-ups under repeated sweeps, by rule.
 pub fn of_convergence(measured: &Convergence) -> Vec<String> {
     let counts = [Rule::Paper, Rule::Robust].map(|rule| {
         let blown_up = measured.of(rule).filter(|run| run.has_blown_up).count();
@@ -197,7 +197,7 @@ pub fn of_convergence(measured: &Convergence) -> Vec<String> {
     )]
 }
 
-/// Which stated uncertainties do not hold.
+/// Stated uncertainties that do not hold.
 pub fn of_coverage(measured: &Coverage) -> Vec<String> {
     let outside = measured.outside();
     let judged = measured
@@ -232,7 +232,7 @@ pub fn of_mistakes(measured: &Mistakes) -> Vec<String> {
     )]
 }
 
-/// Which step to take, and where even that fails.
+/// Recommended step, and its failures.
 pub fn of_stability(measured: &Stability) -> Vec<String> {
     let share = |integrator: &Integrator| {
         let shares = measured
@@ -273,7 +273,7 @@ pub fn of_stability(measured: &Stability) -> Vec<String> {
     )]
 }
 
-/// Whether what should not happen is met as it should be.
+/// Whether extremes are handled correctly.
 pub fn of_extremes(measured: &Extremes) -> Vec<String> {
     let wrong = measured.wrong().map(|extreme| &extreme.fed).join("; ");
     vec![match &*wrong {
@@ -311,7 +311,7 @@ pub fn of_cost(measured: &Cost) -> Vec<String> {
         .collect()
 }
 
-/// Comparison with the libraries that others would use.
+/// Comparison with libraries in common use.
 pub fn of_peers(measured: &Peers) -> Vec<String> {
     let at_size = |size: &PeersAtSize| {
         let [pipeline, query] = [size.pipeline_factor()?, size.query_factor()?].map(three_digits);

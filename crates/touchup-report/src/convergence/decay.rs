@@ -1,7 +1,6 @@
-//! The two laws by which an error may fall from sweep to sweep, fitted by least squares to its
-//! logarithm.
+//! Two laws of error decay from sweep to sweep, fitted by least squares to the error's logarithm.
 
-/// A line through points by least squares.
+/// A least-squares line through points.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Line {
     /// y at x = 0
@@ -10,11 +9,11 @@ pub struct Line {
     pub slope: f64,
     /// root mean square residual in y
     pub left: f64,
-    /// coefficient of determination, 1 − Σ residual² / Σ (y − mean)²; `None` where y does not vary
+    /// coefficient of determination, 1 − Σ residual² / Σ (y − mean)²; `None` for constant y
     pub r_squared: Option<f64>,
 }
 
-/// The line through (x, y); `None` for less than two points, all at one x, or what is not finite.
+/// The line through (x, y); `None` for fewer than two points, equal x, or non-finite values.
 pub fn straight_line(points: &[(f64, f64)]) -> Option<Line> {
     let n = points.len() as f64;
     let (x, y) = points
@@ -47,8 +46,8 @@ pub struct Decay {
     pub power: Line,
 }
 
-/// Fits both laws to the errors after sweep 1, 2, 3, …; `None` for less than two, and for one that
-/// is not above 0.
+/// Fits both laws to the errors after sweep 1, 2, 3, …; `None` for fewer than two errors, or for an
+/// error that is not above 0.
 pub fn fit_decay(errors: &[f64]) -> Option<Decay> {
     let fit = |x: fn(f64) -> f64| {
         let points = errors

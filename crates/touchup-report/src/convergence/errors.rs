@@ -15,7 +15,7 @@ pub struct MeshErrors {
     pub normal_deg: f64,
     /// faces turned away from the truth by more than a right angle
     pub flipped: usize,
-    /// farthest vertex, or the farthest face plane where faces are compared by index, mm
+    /// distance of the farthest vertex, or of the farthest face plane if faces pair by index, mm
     pub farthest_mm: f64,
 }
 
@@ -39,8 +39,8 @@ impl MeshErrors {
         Self::of(&pairs, pairs.iter().map(|pair| pair.0).fold(0.0, f64::max))
     }
 
-    /// Distance of the faces' barycentres and of the vertices from the true surface, angle to its
-    /// normal there.
+    /// Distance of the faces' barycentres and of the vertices from the true surface, and angle to
+    /// its normal there.
     pub fn by_surface(mesh: &TriMesh, truth: &dyn Surface) -> Self {
         let pairs = mesh.faces().map(|(face, _)| {
             let (b, n) = (mesh.barycentre(face), mesh.normal(face));
@@ -73,7 +73,7 @@ impl MeshErrors {
         }
     }
 
-    /// On one line.
+    /// A text of one line.
     pub fn row(&self) -> String {
         let Self {
             distance_mm,

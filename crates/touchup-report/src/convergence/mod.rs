@@ -1,6 +1,5 @@
-//! How the error falls from sweep to sweep \[paper, Sec 4.3 and Fig 11\]: the published rule on a
-//! guided stylus, and the robust mode on a raster, each with an exponential and a power law fitted
-//! to it.
+//! Error decay from sweep to sweep \[paper, Sec 4.3 and Fig 11\]: the published rule on a guided
+//! stylus, and the robust mode on a raster, each with an exponential and a power-law fit.
 
 mod decay;
 mod errors;
@@ -21,12 +20,12 @@ use touchup_core::stylus::Sample;
 use touchup_sim::Peaks;
 
 names! {
-    /// Which rule made the sweeps.
+    /// Rule of the sweeps.
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
     pub enum Rule {
-        /// the published one, 20 s on each face, faces compared by index
+        /// the published rule, 20 s on each face, faces compared by index
         Paper = "published rule",
-        /// the repaired one, one raster a sweep, compared with the surface
+        /// the repaired rule, one raster a sweep, compared with the surface
         Robust = "robust mode",
     }
 }
@@ -34,19 +33,19 @@ names! {
 /// The sweeps over one scan.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SweepRun {
-    /// which rule
+    /// rule of the sweeps
     pub rule: Rule,
-    /// of the scan's noise
+    /// seed of the scan's noise
     pub seed: u64,
     /// edge of the scan's squares, mm
     pub edge_mm: f64,
-    /// before the first sweep and after each one, as far as it came
+    /// before the first sweep and after each completed one
     pub errors: Vec<MeshErrors>,
     /// the error grew to twice its start
     pub has_blown_up: bool,
-    /// why it ended early, in words
+    /// cause of an early end, in words
     pub ended: Option<String>,
-    /// both laws from sweep 1 on; `None` for less than three sweeps, or one that blew up
+    /// both laws from sweep 1 on; `None` for fewer than three sweeps, or a run that blew up
     pub decay: Option<Decay>,
 }
 
@@ -59,20 +58,20 @@ pub struct Convergence {
     pub runs: Vec<SweepRun>,
     /// one face from three starts
     pub one_face: Vec<OneFaceRun>,
-    /// a rule that could not be set up, in words
+    /// setup failures of a rule, in words
     pub failed: Vec<String>,
 }
 
-/// Edges of the scans, m: as the paper's figure shows, and as the robust mode is tested.
+/// Edges of the scans, m: as in the paper's figure, and as in tests of the robust mode.
 const PAPER_EDGE: f64 = 10e-3;
 const ROBUST_EDGE: f64 = 5e-3;
-/// Seed of the first scan: its error at the start is the paper's.
+/// Seed of the first scan: its initial error equals the paper's.
 const FIRST_SEED: u64 = 3;
-/// One face is at rest after it, s.
+/// Time in which one face comes to rest, s.
 const ONE_FACE_S: usize = 40;
 /// Friction of the raster.
 const FRICTION: f64 = 0.15;
-/// A law is not fitted to less sweeps.
+/// Fewest sweeps for the fit of a law.
 const FEWEST_SWEEPS: usize = 3;
 
 impl SweepRun {
@@ -115,7 +114,7 @@ impl SweepRun {
         }
     }
 
-    /// Whether all sweeps were made and the last left less error than there was.
+    /// Whether all sweeps ran and the last left less error than the start.
     pub fn has_converged(&self) -> bool {
         let (first, last) = (self.errors.first(), self.errors.last());
         self.ended.is_none()
@@ -186,8 +185,8 @@ impl Convergence {
         self.runs.iter().filter(move |run| run.rule == rule)
     }
 
-    /// Among the runs of a rule that have fits: in how many the power law explains more than the
-    /// exponential, and how many there are.
+    /// Number of a rule's runs whose power law explains more than their exponential, and number of
+    /// its runs with fits.
     pub fn power_wins(&self, rule: Rule) -> (usize, usize) {
         let fits: Vec<&Decay> = self.of(rule).filter_map(|run| run.decay.as_ref()).collect();
         (

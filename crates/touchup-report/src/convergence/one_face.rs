@@ -1,5 +1,5 @@
 //! One face against one true plane \[paper, Fig 6 and 7\]: the paper's coupled dynamics (Eq 6, 7,
-//! 10), from a state that is off in position and direction to rest.
+//! 10), from a state off in position and direction to rest.
 
 use nalgebra::{Point3, Vector3};
 
@@ -9,15 +9,15 @@ use touchup_core::haptic::{
 };
 use touchup_sim::coupled::GuidedStylus;
 
-/// Time between two samples, s.
+/// Sample period, s.
 const PERIOD_S: f64 = 1e-3;
-/// The stylus starts so far above the face, m.
+/// Initial height of the stylus above the face, m.
 const START_ABOVE: f64 = 5e-3;
 
 /// The face, the tip and their errors at one instant; the true plane is z = 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OneFaceSample {
-    /// since the start, s
+    /// time since the start, s
     pub time_s: f64,
     /// b*, mm
     pub barycentre_mm: [f64; 3],
@@ -32,7 +32,7 @@ pub struct OneFaceSample {
 /// A face from its start to rest.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OneFaceRun {
-    /// between n* and n at the start, degrees
+    /// angle between n* and n at the start, degrees
     pub tilt_deg: f64,
     /// in order of time
     pub samples: Vec<OneFaceSample>,
@@ -45,10 +45,10 @@ const STARTS: [([f64; 3], f64, f64); 3] = [
     ([0.5, 0.5, 4.0], 40.0, 230.0),
 ];
 
-/// Each start for `seconds` (s), noted each 10 ms.
+/// Runs each start for `seconds` (s), with a sample every 10 ms.
 ///
 /// # Errors
-/// [`MeasureError`](crate::error::MeasureError) for a step that was refused.
+/// [`MeasureError`](crate::error::MeasureError) for a refused step.
 pub(super) fn one_face_runs(seconds: usize) -> Measured<Vec<OneFaceRun>> {
     STARTS
         .iter()
@@ -104,7 +104,7 @@ fn one_face(
 }
 
 impl OneFaceRun {
-    /// From when on an error stays below a share of its start, s; `None` where it does not.
+    /// Time after which an error stays below a share of its start, s; `None` if it never does.
     pub fn time_to_share(&self, share: f64, error: impl Fn(&OneFaceSample) -> f64) -> Option<f64> {
         let first = self.samples.first().map(&error)?;
         let above = self

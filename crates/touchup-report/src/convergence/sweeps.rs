@@ -14,12 +14,12 @@ use touchup_sim::{
     add_vertex_noise, raster, touch,
 };
 
-/// Time between two samples of the paper, ns and s.
+/// Sample period of the paper, ns and s.
 const PERIOD_NS: i64 = 5_000_000;
 const PERIOD: f64 = 5e-3;
 /// Samples on each face: 20 s.
 const SAMPLES_PER_FACE: usize = 4000;
-/// A mean error beyond this multiple of its start counts as diverged.
+/// Diverged: a mean error beyond this multiple of its start.
 pub const BLOWN_UP: f64 = 2.0;
 /// The raster's ball, m, and its stiffness, N/m.
 const TIP: TipParams = TipParams {
@@ -34,7 +34,7 @@ pub fn noisy(truth: &TriMesh, seed: u64) -> TriMesh {
     scan
 }
 
-/// The paper's rule with a point for a tip, and a clock.
+/// The paper's rule with a point tip, and a clock.
 #[derive(Clone, Debug)]
 pub struct PaperSweeps {
     truth: TriMesh,
@@ -48,10 +48,10 @@ impl PaperSweeps {
     /// Sweeps over a noisy scan of `peaks` with legs of `edge` (m).
     ///
     /// # Errors
-    /// [`MeasureError`](crate::error::MeasureError) for an edge that is no length.
+    /// [`MeasureError`](crate::error::MeasureError) for an invalid edge.
     pub fn new(edge: f64, guard: Option<GuardParams>, seed: u64) -> Measured<Self> {
         let truth = Peaks::default().mesh(edge)?;
-        // ten million samples: solved together they take twenty times as long
+        // ten million samples: a joint solution takes twenty times as long
         let mut params = RefineParams {
             guard,
             ..RefineParams::paper(TipParams {
@@ -69,13 +69,13 @@ impl PaperSweeps {
         })
     }
 
-    /// Sets the stylus to each face in turn and lets both go where Eq 8–11 and Eq 6–7 take them.
-    /// The true face acts as its plane does in the paper's contact model.
+    /// Sets the stylus to each face in turn and lets both follow Eq 8–11 and Eq 6–7. The true face
+    /// acts as its plane does in the paper's contact model.
     ///
-    /// Stops when the mean distance error is beyond [`BLOWN_UP`] times `start_mm`.
+    /// Stops if the mean distance error is beyond [`BLOWN_UP`] times `start_mm`.
     ///
     /// # Errors
-    /// [`MeasureError::Refine`](crate::error::MeasureError::Refine) for a step that was refused.
+    /// [`MeasureError::Refine`](crate::error::MeasureError::Refine) for a refused step.
     pub fn sweep(&mut self, start_mm: f64) -> Measured<MeshErrors> {
         let faces: Vec<_> = self.truth.faces().map(|(face, _)| face).collect();
         let (model, stylus) = (self.params.dynamics.model, GuidedStylus::default());
@@ -109,7 +109,7 @@ impl PaperSweeps {
         Ok(self.errors())
     }
 
-    /// Face by face, as the paper measures.
+    /// Face by face, as in the paper.
     pub fn errors(&self) -> MeshErrors {
         MeshErrors::by_index(self.refiner.mesh(), &self.truth)
     }
@@ -127,10 +127,10 @@ pub(crate) fn region_over(peaks: &Peaks, half: f64, radius: f64) -> RasterRegion
     }
 }
 
-/// One raster of a ball over the whole square: what a perfect sensor reports every millisecond.
+/// One raster of a ball over the whole square: samples of a perfect sensor, one per millisecond.
 ///
 /// # Errors
-/// [`MeasureError::Sim`](crate::error::MeasureError::Sim) for a friction that is none.
+/// [`MeasureError::Sim`](crate::error::MeasureError::Sim) for an invalid friction.
 pub fn raster_samples(peaks: &Peaks, friction: f64) -> Measured<Vec<Sample>> {
     let TipParams { radius, stiffness } = TIP;
     let stiffness = stiffness.unwrap_or(f64::INFINITY);
@@ -198,10 +198,10 @@ impl<'a> RobustSweeps<'a> {
         })
     }
 
-    /// Goes over the square once.
+    /// Runs one raster over the square.
     ///
     /// # Errors
-    /// [`MeasureError::Refine`](crate::error::MeasureError::Refine) for a sample that was refused.
+    /// [`MeasureError::Refine`](crate::error::MeasureError::Refine) for a refused sample.
     pub fn sweep(&mut self) -> Measured<MeshErrors> {
         let start_ns = self.last_ns;
         for sample in self.samples {
@@ -214,7 +214,7 @@ impl<'a> RobustSweeps<'a> {
         Ok(self.errors())
     }
 
-    /// Against the surface: where a raster ends, faces have no index in common with the truth.
+    /// Against the surface: beyond a raster, faces share no index with the truth.
     pub fn errors(&self) -> MeshErrors {
         MeshErrors::by_surface(self.refiner.mesh(), self.peaks)
     }

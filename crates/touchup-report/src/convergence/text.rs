@@ -6,13 +6,13 @@ use crate::{Axis, Chapter, Figure, LineStroke, Mark, Series, Table};
 use itertools::Itertools;
 use touchup_page::number::range;
 
-/// Errors of one face below it are roundings.
+/// Errors of one face below this value are roundings.
 const DRAWN_FROM: f64 = 1e-12;
-/// Points of a drawn law between two sweeps.
+/// Points of a law's curve between two sweeps.
 const STEPS: usize = 8;
 
 impl Convergence {
-    /// As a part of the report.
+    /// Chapter of the report.
     pub fn chapter(&self) -> Chapter {
         let text = std::iter::once(self.introduction())
             .chain(Rule::ALL.map(|rule| self.verdict(rule)))
@@ -195,7 +195,7 @@ fn one_face_name(run: &OneFaceRun) -> String {
     format!("leaning {} degrees", run.tilt_deg)
 }
 
-/// When which error is down to a tenth, and what is left at the end.
+/// Time at which each error is down to a tenth, and the residual at the end.
 fn one_face_text(run: &OneFaceRun) -> String {
     let tenth = |error: fn(&OneFaceSample) -> f64| {
         let time_s = run.time_to_share(0.1, error);
@@ -220,7 +220,7 @@ fn one_face_text(run: &OneFaceRun) -> String {
     )
 }
 
-/// Both laws, from sweep 1 to the last.
+/// Curves of both laws, from sweep 1 to the last.
 fn drawn(decay: &Decay, name: &str, sweeps: usize) -> [Series; 2] {
     let at = |step: usize| 1.0 + step as f64 / STEPS as f64;
     [("exponential", 0), ("power law", 1)].map(|(law, which)| {

@@ -9,18 +9,18 @@ use itertools::Itertools;
 use touchup_page::number::three_digits;
 use touchup_sim::wavy::RADIUS;
 
-/// A time within this of the law is no more than the law.
+/// Largest ratio of a time to the law that still counts as the law.
 const NO_MORE: f64 = 1.05;
-/// A difference of whole pushes below this share of a push cannot be distinguished from noise.
+/// Differences of whole pushes below this share of a push drown in noise.
 const DISCERNIBLE: f64 = 0.02;
-/// How recordings are refined, below their figures.
+/// Method of the recordings, below their figures.
 const HOW: &str = "The default scene over a recording at 1 kHz: quantiles of the pushes, and all from the scan in memory to the mesh with \
                    its patch, divided by the samples. parry3d: the median of its tree of boxes brought up to date after the vertices \
                    within one radius of the tip moved, and of one closest face; what finds and moves them is not counted, and neither is \
                    the rest of a push.";
 
 impl Cost {
-    /// As it is printed.
+    /// Chapter of the report.
     pub fn chapter(&self) -> Chapter {
         let texts = [
             self.recording_text(),
@@ -99,7 +99,7 @@ impl Cost {
         let ends = |of: fn(&RecordingCost) -> f64| {
             let all = self.by_edge.iter().chain(&self.by_faces);
             let order = |a: &&RecordingCost, b: &&RecordingCost| of(a).total_cmp(&of(b));
-            // of equals the first is the least, and the last is the most
+            // of equal ones the first is the least, and the last is the most
             let ends = [all.clone().min_by(order)?, all.max_by(order)?];
             Some(ends.map(|recording| {
                 let (faces, edge_mm) = (recording.faces, recording.edge * 1e3);
@@ -189,7 +189,7 @@ impl Cost {
         ))
     }
 
-    /// Of the scenes that were replayed the slowest, samples/s.
+    /// Slowest replay of the scenes that move the mesh, samples/s.
     pub fn slowest_replay_per_s(&self) -> Option<f64> {
         let moving = self.replays.iter().filter(|replay| replay.scene != READING);
         let speeds = moving.map(|replay| replay.samples_per_s.median);
@@ -306,7 +306,7 @@ fn us(ns: u64) -> f64 {
 
 /// Pushes, the whole, and the peer, against `x`.
 ///
-/// - `more`: behind each name.
+/// - `more`: suffix of each name.
 fn recording_curves(
     recordings: &[RecordingCost],
     more: &str,

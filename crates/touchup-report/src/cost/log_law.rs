@@ -1,8 +1,8 @@
-//! Does the time of a push grow with the logarithm of the scan? t = a + b ln F.
+//! Growth of a push's time with the logarithm of the scan: t = a + b ln F.
 
 use crate::convergence::{Line, straight_line};
 
-/// The law, fitted by least squares.
+/// The law, a least-squares fit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LogLaw {
     /// ns
@@ -12,9 +12,9 @@ pub struct LogLaw {
 }
 
 impl LogLaw {
-    /// Of faces and times (ns); `None` for fewer than two sizes.
+    /// Fits faces and times (ns); `None` for fewer than two sizes.
     ///
-    /// A time that falls with the size is taken for constant: noise is no law.
+    /// A time that falls with the size counts as constant: noise is no law.
     pub fn fit(points: &[(usize, f64)]) -> Option<Self> {
         let logs: Vec<_> = points
             .iter()
@@ -34,7 +34,7 @@ impl LogLaw {
         })
     }
 
-    /// Time at so many faces, ns.
+    /// Time at a number of faces, ns.
     pub fn at(&self, faces: usize) -> f64 {
         self.a_ns + self.b_ns * (faces as f64).ln()
     }

@@ -1,4 +1,4 @@
-//! The least that any refiner must do, written by hand: closest face, move its corners, update the
+//! Hand-written loop with the least work of any refiner: closest face, move its corners, update the
 //! tree.
 
 use nalgebra::Point3;
@@ -7,16 +7,16 @@ use touchup_core::mesh::{FaceId, FaceTree, Nearby, RefitPlan, TriMesh, VertexId}
 use touchup_core::stylus::Sample;
 use touchup_sim::wavy::{FORCE, RADIUS, STIFFNESS};
 
-/// Share of the mismatch that goes in a second, 1/s: as in the refiner.
+/// Share of the mismatch that relaxes per second, 1/s: as in the refiner.
 const RELAXATION: f64 = 25.0;
-/// Between two samples, s.
+/// Sample period, s.
 const STEP: f64 = 1e-3;
-/// By which boxes are made wider where they are planned: far more than a sample moves, m.
+/// Margin of planned boxes: far more than a sample moves, m.
 const MARGIN: f64 = 2e-5;
 /// Search radius of a contact, m.
 pub(super) const REACH: f64 = 0.01;
 
-/// Share of the mismatch that goes with each sample.
+/// Share of the mismatch that relaxes per sample.
 pub(super) fn gain() -> f64 {
     -(-RELAXATION * STEP).exp_m1()
 }
@@ -24,7 +24,7 @@ pub(super) fn gain() -> f64 {
 /// A mesh that follows the ball of [`touchup_sim::wavy`], and nothing else.
 #[derive(Clone, Debug)]
 pub struct MinimalLoop {
-    /// as it is now
+    /// current mesh
     pub mesh: TriMesh,
     tree: FaceTree,
     gain: f64,
@@ -32,7 +32,7 @@ pub struct MinimalLoop {
     plan: Option<StaleBoxes>,
 }
 
-/// Which boxes are to be brought up to date, as long as the face stays, and which leaves are near.
+/// Boxes to update as long as the face stays, and leaves nearby.
 #[derive(Clone, Debug, Default)]
 struct StaleBoxes {
     face: Option<FaceId>,
@@ -53,8 +53,8 @@ impl MinimalLoop {
         }
     }
 
-    /// As [`Self::new`], and keeps what it looked up, as the refiner does: which boxes to bring up
-    /// to date, and what is near.
+    /// As [`Self::new`], and keeps its look-ups, as the refiner does: boxes to update, and near
+    /// leaves.
     pub fn keeping(mesh: TriMesh) -> Self {
         Self {
             plan: Some(StaleBoxes::default()),

@@ -1,4 +1,4 @@
-//! What each stage costs, with and without each optional part, and for scans of every size.
+//! Cost of each stage, with and without each optional part, and for scans of every size.
 
 mod chapter;
 mod log_law;
@@ -22,37 +22,37 @@ pub use stages::{SeldomCost, StageCost};
 pub use turns::PerSample;
 use turns::Timing;
 
-/// The cheapest scene takes at most this many times as long as the loop that is written by hand.
+/// Limit on the run time of the cheapest scene, relative to the hand-written loop.
 pub const LARGEST_RATIO: f64 = 1.05;
 
-/// A recording is replayed at least so fast, samples/s.
+/// Least speed of a replay, samples/s.
 pub const LEAST_REPLAY_PER_S: f64 = 500_000.0;
 
-/// Sizes up to this one give the law that the larger ones are held against, faces.
+/// Largest size in the fit of the law, which the larger ones are compared with, faces.
 pub const LAW_UP_TO: usize = 105_000;
 
-/// Everything that was measured.
+/// All cost measurements.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cost {
     /// recordings refined by the default scene, on scans of one size
     pub by_edge: Vec<RecordingCost>,
-    /// … and on scans of equal edges, their faces rising
+    /// recordings refined by the default scene, on scans of equal edges, their faces rising
     pub by_faces: Vec<RecordingCost>,
     /// the cheapest push, by size of the scan, rising
     pub sizes: Vec<SizeCost>,
-    /// t = a + b ln F of the cheapest scene, of scans of 10k to 100k faces
+    /// t = a + b ln F of the cheapest scene, for scans of 10k to 100k faces
     pub barest_law: Option<LogLaw>,
     /// whole pushes with and without each optional part
     pub parts: Vec<PartCost>,
     /// stages by themselves
     pub stages: Vec<StageCost>,
-    /// what is not done at each sample
+    /// occasional work, not at each sample
     pub seldom: Vec<SeldomCost>,
     /// recordings read and refined
     pub replays: Vec<ReplaySpeed>,
 }
 
-/// Measures all of it.
+/// Measures all costs.
 ///
 /// # Errors
 /// [`MeasureError`](crate::error::MeasureError).

@@ -1,5 +1,5 @@
-//! The index that a user could take instead: the tree of boxes of `parry3d`, in double precision,
-//! kept true leaf by leaf.
+//! An alternative index for users: the tree of boxes of `parry3d`, in double precision, updated
+//! leaf by leaf.
 
 use std::time::{Duration, Instant};
 
@@ -18,18 +18,18 @@ use touchup_sim::wavy::{FORCE, RADIUS};
 /// A mesh that follows the ball of [`touchup_sim::wavy`] within one radius of the tip, with the
 /// index of a peer.
 pub struct ParryLoop {
-    /// as it is now
+    /// current mesh
     pub mesh: TriMesh,
     tree: Bvh,
     region: TouchedRegion,
 }
 
-/// What a touch moves.
+/// Region that a touch moves.
 #[derive(Default)]
 struct TouchedRegion {
     vertices: Vec<VertexId>,
     faces: Vec<FaceId>,
-    /// by vertex and by face: the touch that last took it
+    /// by vertex and by face: number of the last touch that included it
     taken: [Vec<u32>; 2],
     touches: u32,
 }
@@ -42,8 +42,8 @@ impl TouchedRegion {
         }
     }
 
-    /// The corners of a face, all that is joined to them within one radius of the tip, and the
-    /// faces around.
+    /// Finds the corners of a face, all vertices connected to them within one radius of the tip,
+    /// and the faces around.
     fn find(&mut self, mesh: &TriMesh, (face, touched): (FaceId, Point3<f64>)) {
         let Self {
             vertices,
@@ -107,7 +107,7 @@ impl ParryLoop {
         }
     }
 
-    /// The closest face, and its point that is closest.
+    /// The closest face, and its closest point.
     pub fn closest(&self, p: &Point3<f64>) -> Option<(FaceId, Point3<f64>)> {
         let Self { tree, mesh, .. } = self;
         let project = |face: u32, _| {
@@ -119,8 +119,8 @@ impl ParryLoop {
         Some((FaceId(face), Point3::new(point.x, point.y, point.z)))
     }
 
-    /// Takes one sample; returns how long the closest face and the tree took, without what finds
-    /// and moves the vertices.
+    /// Takes one sample; returns the time of closest face and tree, without the search for the
+    /// vertices and their move.
     pub fn push(&mut self, sample: &Sample) -> Option<Duration> {
         let p = touching(sample);
         let normal: Vector3<f64> = sample.wrench.force / FORCE;
@@ -136,7 +136,7 @@ impl ParryLoop {
             .for_each(|&vertex| mesh.set_position(vertex, mesh.position(vertex) + step));
         let started = Instant::now();
         for &face in &region.faces {
-            // grows the boxes above as far as they do not hold it yet
+            // grows the boxes above until they contain it
             tree.insert(aabb(mesh, face), face.0);
         }
         Some(query + started.elapsed())

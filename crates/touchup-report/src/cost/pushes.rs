@@ -1,5 +1,5 @@
-//! What a push of the haptic update costs: on scans of different size for the hand-written loop and
-//! the cheapest scene, and with and without each optional part of the default one.
+//! Cost of a push of the haptic update: by scan size for the hand-written loop and the cheapest
+//! scene, and with and without each optional part of the default scene.
 
 use std::ops::{Div, Sub};
 
@@ -20,26 +20,26 @@ pub const BAREST: &str = "{ refine: { roi_mm: 0, beta_per_n2_s: 0 }, sync: off, 
 /// Length of the short edges of a scan that grows with its faces, m.
 pub(super) const EDGE: f64 = 1e-3;
 
-/// On a scan of so many faces.
+/// Costs at one scan size.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SizeCost {
     /// faces
     pub faces: usize,
     /// the hand-written loop, on a plate of 0.3 m
     pub minimal: PerSample,
-    /// the same loop, which keeps what it looked up
+    /// the same loop with kept look-ups
     pub keeping: PerSample,
-    /// the cheapest scene that moves a mesh, on the same
+    /// the cheapest scene that moves a mesh, on the same plate
     pub barest: PerSample,
-    /// block by block, how many times as long the cheapest scene takes as the loop
+    /// block by block, time of the cheapest scene over time of the loop
     pub barest_to_minimal: Spread,
-    /// … and as the loop that keeps
+    /// block by block, time of the cheapest scene over time of the loop with kept look-ups
     pub barest_to_keeping: Spread,
     /// memory of the mesh of the cheapest scene, bytes per face
     pub mesh_bytes_per_face: f64,
-    /// … and of its tree
+    /// memory of the cheapest scene's tree, bytes per face
     pub tree_bytes_per_face: f64,
-    /// time of building that tree, ms
+    /// time to build that tree, ms
     pub tree_build_ms: f64,
 }
 
@@ -67,7 +67,7 @@ pub(super) fn touched_plate(
     ))
 }
 
-/// A refiner as a scene names it.
+/// Refiner of a scene.
 pub(super) fn refiner_of(scene: &Scene, mesh: TriMesh) -> Measured<Refiner> {
     // the force of the slide is in the axes of the scan
     let params = scene
@@ -123,7 +123,7 @@ pub(super) fn size_cost(faces: usize, timing: Timing) -> Measured<SizeCost> {
 /// A part of the haptic update, switched on and off.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PartCost {
-    /// by its name in the scene
+    /// name in the scene
     pub part: String,
     /// faces of the scan
     pub faces: usize,
@@ -131,14 +131,13 @@ pub struct PartCost {
     pub is_default: bool,
     /// a push with it
     pub with: PerSample,
-    /// … and without it
+    /// a push without it
     pub without: PerSample,
-    /// block by block, what it costs, ns; the rest of the scene is as by default
+    /// block by block, cost of the part, ns; the rest of the scene is as by default
     pub cost_ns: Spread,
 }
 
-/// Zero mass and zero bias: it costs what any other payload and bias cost, and the touches stay the
-/// same.
+/// Zero mass and zero bias: same cost as any other payload and bias, and unchanged touches.
 const COMPENSATION: &str = "compensation: { payload: { mass_kg: 0, centre_mm: [0, 0, 40] }, \
                             bias: { force_n: [0, 0, 0], torque_nm: [0, 0, 0] } }";
 
@@ -210,7 +209,7 @@ pub(super) fn part_costs(faces: usize, timing: Timing) -> Measured<Vec<PartCost>
         .iter()
         .map(|(.., scene)| refiner_of(scene, mesh.clone()));
     let mut refiners = refiners.collect::<Result<Vec<_>, _>>()?;
-    // what can be undone is kept by the refiner alone where there is no patch
+    // without a patch, the refiner alone keeps the undo data
     if let Some(last) = refiners.last_mut() {
         last.keep_strokes();
     }

@@ -1,6 +1,6 @@
-//! A recording of a ball that slides, on scans of any edge length and size: each push of the
-//! default scene, and all from the scan in memory to the mesh with its patch, as the program
-//! refines a recording; beside it the index of a peer over the same samples.
+//! A recording of a sliding ball, on scans of any edge length and size: each push of the default
+//! scene, and the whole from the scan in memory to the mesh with its patch, as the program refines
+//! a recording; beside it a peer's index over the same samples.
 
 use std::time::Instant;
 
@@ -22,23 +22,23 @@ const EDGES_BY_FACES: [f64; 2] = [0.1 * RADIUS, EDGE];
 /// One recording, refined.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RecordingCost {
-    /// of the scan
+    /// faces of the scan
     pub faces: usize,
     /// length of its short edges, m
     pub edge: f64,
     /// samples of the recording
     pub samples: usize,
-    /// one push, its patch made at the end
+    /// one push; the patch follows at the end
     pub push: Quantiles,
-    /// until the first push, ms
+    /// time before the first push, ms
     pub begin_ms: f64,
     /// after the last push: the patch, and the mesh with it, ms
     pub patch_ms: f64,
     /// from the scan in memory to the mesh with its patch, for each sample, µs
     pub whole_us: f64,
-    /// what the index of the peer takes: brought up to date, and asked for the closest face
+    /// time of the peer's index: update, and query for the closest face
     pub peer: Quantiles,
-    /// vertices that a touch moves there, mean
+    /// vertices that a touch moves in the peer, mean
     pub peer_moves: f64,
 }
 

@@ -1,4 +1,4 @@
-//! How fast a recording is read and refined by one thread.
+//! Speed of one thread that reads and refines a recording.
 
 use std::path::Path;
 
@@ -17,7 +17,7 @@ pub const READING: &str = "none: read and paired alone";
 /// One scene over the whole recording.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ReplaySpeed {
-    /// which
+    /// scene by name
     pub scene: String,
     /// faces of the scan
     pub faces: usize,
@@ -25,7 +25,7 @@ pub struct ReplaySpeed {
     pub edge_mm: f64,
     /// samples of the recording
     pub samples: usize,
-    /// read, synchronised and pushed
+    /// rate of reading, synchronising and pushing
     pub samples_per_s: Spread,
 }
 
@@ -98,7 +98,7 @@ pub(super) fn messages(sample: &Sample) -> [Message; 2] {
     ]
 }
 
-/// Reads and pairs all, and gives each sample to `push`; returns how many there were in a second.
+/// Reads and pairs all, and gives each sample to `push`; returns their rate, 1/s.
 fn replay(
     path: &Path,
     topics: &Topics,

@@ -26,29 +26,29 @@ use touchup_sim::wavy::{RADIUS, STIFFNESS};
 /// One stage on one scan.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StageCost {
-    /// what it does
+    /// work of the stage
     pub stage: String,
     /// faces of the scan
     pub faces: usize,
-    /// of one sample
+    /// cost of one sample
     pub per_sample: PerSample,
 }
 
-/// Work done now and then, not at each sample.
+/// Occasional work, not at each sample.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SeldomCost {
-    /// what it does
+    /// description
     pub work: String,
     /// faces of the scan
     pub faces: usize,
-    /// once, ms
+    /// time of one execution, ms
     pub time_ms: Spread,
 }
 
 /// Samples between two renewals of the patch: 8 ms at 1 kHz, as beside a stylus.
 const RENEWAL: usize = 8;
 
-/// The point that the ball touches with.
+/// Contact point of the ball.
 pub(super) fn touching(sample: &Sample) -> Point3<f64> {
     let force = &sample.wrench.force;
     Point3::from(sample.pose_ot.translation.vector) + force / STIFFNESS - force.normalize() * RADIUS
@@ -61,7 +61,7 @@ fn contacts_of(samples: &[Sample], tip: TipParams) -> Measured<Vec<ContactSample
     samples.iter().map(observe).collect()
 }
 
-/// Times every stage that can be called by itself, on a scan of edges of 1 mm.
+/// Times every stage that is callable by itself, on a scan of edges of 1 mm.
 #[expect(clippy::too_many_lines)]
 pub(super) fn stage_costs(faces: usize, timing: Timing) -> Measured<Vec<StageCost>> {
     let (mesh, samples) = touched_plate(faces, side_of(faces), timing.samples())?;
@@ -166,7 +166,7 @@ pub(super) fn stage_costs(faces: usize, timing: Timing) -> Measured<Vec<StageCos
         .collect()
 }
 
-/// A mesh of its own whose boxes are brought up to date.
+/// A separate mesh whose boxes follow it.
 struct Moving {
     mesh: TriMesh,
     tree: FaceTree,
@@ -175,9 +175,8 @@ struct Moving {
 }
 
 impl Moving {
-    /// Brings the boxes around the face under the tip up to date, and returns that. Which face that
-    /// is, and which boxes, is looked up once for a millimetre of travel, as the refiner does it
-    /// once for each face.
+    /// Updates the boxes around the face under the tip, and returns the face. Looks up face and
+    /// boxes once per millimetre of travel, as the refiner does once per face.
     fn follow(&mut self, p: &Point3<f64>) -> Option<FaceId> {
         let Self {
             mesh,
@@ -200,7 +199,7 @@ impl Moving {
     }
 }
 
-/// Times the work that is not done at each sample.
+/// Times the occasional work.
 pub(super) fn seldom_costs(faces: usize, repeats: usize) -> Measured<Vec<SeldomCost>> {
     let (mesh, samples) = touched_plate(faces, side_of(faces), 1000 + RENEWAL * repeats)?;
     let tree = FaceTree::new(&mesh);
@@ -212,7 +211,7 @@ pub(super) fn seldom_costs(faces: usize, repeats: usize) -> Measured<Vec<SeldomC
         contacts.iter().for_each(|contact| patcher.push(contact));
         timed(|| patcher.renewed(&mesh, &tree)).0 * 1e3
     };
-    // the first renewal takes in all that came before
+    // the first renewal covers all earlier samples
     renew(&contacts[..1000]);
     let renewals = spread(contacts[1000..].chunks_exact(RENEWAL).map(renew))?;
     let looks = spread((0..repeats.clamp(1, 3)).map(|_| timed(|| detect(&mesh, &[])).0 * 1e3))?;

@@ -23,7 +23,7 @@ impl<'a> TimedCase<'a> {
         }
     }
 
-    /// Does the same with each of `items`, of which every sample has one.
+    /// Does the same work with each of `items`, one per sample.
     pub fn each<T, R>(
         name: &'a str,
         items: &'a [T],
@@ -37,7 +37,7 @@ impl<'a> TimedCase<'a> {
     }
 }
 
-/// How much is timed: samples to warm up, blocks, and samples in a block.
+/// Amount of timing: samples to warm up, blocks, and samples in a block.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Timing {
     pub warm: usize,
@@ -46,18 +46,18 @@ pub(super) struct Timing {
 }
 
 impl Timing {
-    /// Samples that are needed in all.
+    /// Number of samples required.
     pub fn samples(&self) -> usize {
         self.warm + self.blocks * self.block
     }
 }
 
-/// Of one sample.
+/// Cost of one sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PerSample {
     /// time, ns
     pub time_ns: Spread,
-    /// requests to the allocator; `None` where the program does not count them
+    /// requests to the allocator; `None` if the program does not count them
     pub allocations: Option<f64>,
     /// allocated bytes
     pub allocated_bytes: Option<f64>,
@@ -66,7 +66,7 @@ pub struct PerSample {
 /// Times of one case, block by block.
 #[derive(Default)]
 pub(super) struct Timed {
-    /// of one sample, ns
+    /// time of one sample, ns
     pub blocks_ns: Vec<f64>,
     requests: u64,
     bytes: u64,
@@ -81,7 +81,7 @@ impl Timed {
         let started = Instant::now();
         (case.run)(samples)?;
         let time_ns = started.elapsed().as_nanos() as f64;
-        // asking is a request of its own
+        // the query of the counters is a request too
         if let (Some(before), Some(after)) = (before, asked()) {
             self.requests += (after.requests - before.requests).saturating_sub(1);
             self.bytes += (after.bytes - before.bytes).saturating_sub(1);
@@ -104,8 +104,8 @@ impl Timed {
     }
 }
 
-/// Runs all cases over the same samples: first to warm up, then block by block, another one first
-/// each time.
+/// Runs all cases over the same samples: first to warm up, then block by block, each time with
+/// another case first.
 pub(super) fn in_turns(cases: &mut [TimedCase], timing: Timing) -> Measured<Vec<Timed>> {
     let counts = asked().is_some();
     let mut timed: Vec<_> = cases
@@ -128,7 +128,7 @@ pub(super) fn in_turns(cases: &mut [TimedCase], timing: Timing) -> Measured<Vec<
     Ok(timed)
 }
 
-/// Block by block, the first compared with the second: their ratio, or their difference in ns.
+/// Block by block, the first against the second: their ratio, or their difference in ns.
 pub(super) fn by_block(of: &Timed, to: &Timed, compare: fn(f64, f64) -> f64) -> Measured<Spread> {
     spread(
         of.blocks_ns
@@ -138,7 +138,7 @@ pub(super) fn by_block(of: &Timed, to: &Timed, compare: fn(f64, f64) -> f64) -> 
     )
 }
 
-/// Of what was timed.
+/// Spread of times.
 pub(super) fn spread(times: impl IntoIterator<Item = f64>) -> Measured<Spread> {
     Spread::of(times.into_iter().collect()).ok_or(MeasureError::NothingTimed)
 }

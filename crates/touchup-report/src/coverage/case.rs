@@ -1,4 +1,4 @@
-//! One seed of one world: scan and recording in memory, refined as `touchup refine` does.
+//! One seed of one world: scan and recording in memory, refined as by `touchup refine`.
 
 use super::kind::CoverageKind;
 use super::stated::StatedNumber;
@@ -13,11 +13,11 @@ use touchup_session::scene::Scene;
 use touchup_session::session::found;
 use touchup_sim::{DrawnWorld, Plate, SimWorld, Surface};
 
-/// Shares of a turn that the hand goes along walls, by seed: it goes into no hole, goes around,
-/// goes half and a third of the way.
+/// Shares of a turn that the hand follows along walls, by seed: a full turn, no hole at all, half a
+/// turn, a third.
 const TURNS: [Option<f64>; 4] = [Some(1.0), None, Some(0.5), Some(1.0 / 3.0)];
 
-/// All numbers that are stated of a plate.
+/// All stated numbers of a plate.
 pub(super) fn run(
     world: SimWorld,
     seed: u64,

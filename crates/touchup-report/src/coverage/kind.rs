@@ -1,28 +1,28 @@
-//! Kinds of numbers that the program states with an uncertainty.
+//! Kinds of numbers with a stated uncertainty.
 
 use touchup_core::names;
 
 names! {
-    /// What a stated number is of.
+    /// Kind of a stated number.
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
     pub enum CoverageKind {
         /// touched, farther than 1 mm from every sharp edge of the true part
         PlaneVertex = "vertex, plane",
-        /// touched, within 1 mm of a sharp edge that is no rim
+        /// touched, within 1 mm of a sharp edge other than a rim
         EdgeVertex = "vertex, edge",
         /// touched, within 1 mm of the opening of a hole or slot
         RimVertex = "vertex, rim",
-        /// not touched itself, but guessed from touches nearby
+        /// untouched, but interpolated from touches nearby
         InterpolatedVertex = "vertex, interpolated",
         /// across the axis, each direction
         HolePosition = "hole position",
-        /// of its wall
+        /// diameter of its wall
         HoleDiameter = "hole diameter",
-        /// of a blind one, from opening to floor
+        /// depth of a blind hole, from opening to floor
         HoleDepth = "hole depth",
         /// across the axis of the opening, each direction
         SlotPosition = "slot position",
-        /// between its walls
+        /// distance between its walls
         SlotWidth = "slot width",
         /// over its rounded ends
         SlotLength = "slot length",
@@ -30,7 +30,7 @@ names! {
         SlotDepth = "slot depth",
         /// across the axis, each direction
         BossPosition = "boss position",
-        /// of its wall
+        /// diameter of its wall
         BossDiameter = "boss diameter",
         /// from foot to top
         BossHeight = "boss height",
@@ -38,13 +38,13 @@ names! {
         PlanePosition = "plane position",
         /// across it, each direction
         EdgePosition = "edge position",
-        /// numbers of features that were fitted to the mesh, as too little of them was touched
+        /// numbers of features fitted to the mesh for lack of touches
         OfMesh = "feature fitted to the mesh",
     }
 }
 
 impl CoverageKind {
-    /// Whether it is of the vertices.
+    /// Whether the kind concerns vertices.
     pub fn is_of_vertices(self) -> bool {
         matches!(
             self,
@@ -52,8 +52,8 @@ impl CoverageKind {
         )
     }
 
-    /// Demanded share of numbers within 1.96 standard deviations; `None`: their root mean square is
-    /// what counts.
+    /// Demanded share of numbers within 1.96 standard deviations; `None`: the criterion is their
+    /// root mean square.
     pub fn least_within(self) -> Option<f64> {
         match self {
             Self::EdgeVertex | Self::RimVertex => Some(0.90),

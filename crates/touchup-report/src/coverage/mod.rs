@@ -1,9 +1,9 @@
-//! Whether stated uncertainties hold: parts of known truth, touched in named worlds, and the error
+//! Validity of stated uncertainties: parts of known truth, touched in named worlds, and the error
 //! of each number over its stated standard deviation.
 //!
-//! A world draws its truth from a seed, and the program is told what a calibration leaves of it
-//! ([`SimWorld`]). Scan and recording are made in memory, and go through the engine and the search
-//! for features of `touchup refine`.
+//! A world draws its truth from a seed; the program learns the part of it that a calibration leaves
+//! ([`SimWorld`]). Scan and recording stay in memory, and pass through the engine and the feature
+//! search of `touchup refine`.
 
 mod case;
 mod kind;
@@ -20,12 +20,12 @@ pub use stated::StatedNumber;
 use super::Effort;
 use touchup_sim::SimWorld;
 
-/// What is run.
+/// Extent of the runs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CoverageParams {
-    /// in this order
+    /// worlds, in this order
     pub worlds: Vec<SimWorld>,
-    /// of each world
+    /// seeds of each world
     pub seeds: RangeInclusive<u64>,
     /// longest time of the rasters over the part, s
     pub longest: f64,
@@ -45,26 +45,26 @@ impl CoverageParams {
 /// The numbers of one kind in one world, over all seeds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct KindInWorld {
-    /// which world
+    /// world
     pub world: SimWorld,
-    /// which kind
+    /// kind
     pub kind: CoverageKind,
-    /// all of them
+    /// the numbers
     pub numbers: Vec<StatedNumber>,
 }
 
 /// Errors over stated standard deviations, by world and kind.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Coverage {
-    /// what was run
+    /// extent of the runs
     pub params: CoverageParams,
-    /// each kind that was met in each world
+    /// each kind that occurs in each world
     pub kinds: Vec<KindInWorld>,
-    /// a case that could not be run, in words
+    /// failed cases, in words
     pub failed: Vec<String>,
 }
 
-/// The root mean square of error over stated standard deviation is to be within these.
+/// Acceptable root mean square of error over stated standard deviation.
 pub const HONEST: [f64; 2] = [0.8, 1.25];
 
 impl KindInWorld {
@@ -72,12 +72,12 @@ impl KindInWorld {
         self.numbers.iter().filter_map(StatedNumber::score)
     }
 
-    /// How many have a stated standard deviation and are no bounds.
+    /// Count of numbers with a stated standard deviation, without bounds.
     pub fn count(&self) -> usize {
         self.scores().count()
     }
 
-    /// Mean of their errors, m.
+    /// Mean error, m.
     pub fn mean_error(&self) -> Option<f64> {
         mean(
             self.numbers
@@ -87,7 +87,7 @@ impl KindInWorld {
         )
     }
 
-    /// Root mean square of error over stated standard deviation; 1 where the statement holds.
+    /// Root mean square of error over stated standard deviation; 1 for a correct statement.
     pub fn rms_score(&self) -> Option<f64> {
         mean(self.scores().map(|score| score * score)).map(f64::sqrt)
     }
@@ -100,7 +100,7 @@ impl KindInWorld {
         )
     }
 
-    /// How many are lower bounds, and how many of these the truth contradicts.
+    /// Number of lower bounds, and number of bounds that the truth contradicts.
     pub fn bounds(&self) -> [usize; 2] {
         let bounds = || self.numbers.iter().filter(|number| number.is_at_least);
         [
@@ -109,7 +109,7 @@ impl KindInWorld {
         ]
     }
 
-    /// Whether the statements hold as well as is demanded; `None` where there is none.
+    /// Whether the statements meet the demand; `None` without statements.
     pub fn holds(&self) -> Option<bool> {
         let rms = self.rms_score()?;
         let is_enough = self

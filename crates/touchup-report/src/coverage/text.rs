@@ -7,14 +7,14 @@ use itertools::Itertools;
 use touchup_page::number::three_digits;
 use touchup_sim::SimWorld;
 
-/// Marks of a cumulative curve, and where it ends.
+/// Marks of a cumulative curve, and its end.
 const MARKS: usize = 60;
 const LARGEST_SCORE: f64 = 6.0;
-/// Number of points by which the area under the normal density is summed up between two marks.
+/// Half the number of Simpson intervals per unit of the normal density's argument.
 const PARTS: usize = 20;
 
 impl Coverage {
-    /// As a part of the report.
+    /// Chapter of the report.
     pub fn chapter(&self) -> Chapter {
         let text = std::iter::once(self.introduction()).chain(not_run(&self.failed));
         let is_of_feature = |kind: CoverageKind| !kind.is_of_vertices();
@@ -48,7 +48,7 @@ impl Coverage {
         )
     }
 
-    /// What is outside of the demands, a line each.
+    /// Violations of the demands, a line each.
     pub fn outside(&self) -> Vec<String> {
         let line = |of: &KindInWorld| {
             let rms = three_digits(of.rms_score()?);
@@ -114,7 +114,7 @@ impl Coverage {
             ))
     }
 
-    /// How large a share of the numbers is within so many standard deviations.
+    /// Share of the numbers within a multiple of the standard deviation.
     fn curves(&self, id: &str, what: &str, is_meant: fn(CoverageKind) -> bool) -> Figure {
         let at = |i: usize| LARGEST_SCORE * i as f64 / MARKS as f64;
         let worlds = self.params.worlds.iter().filter_map(|&world| {
@@ -143,7 +143,7 @@ impl Coverage {
     }
 }
 
-/// Share of a normal distribution within ± x standard deviations: its density summed up by
+/// Share of a normal distribution within ± x standard deviations: integral of its density by
 /// Simpson's rule.
 fn normal_within(x: f64) -> f64 {
     let parts = 2 * PARTS * (1 + x as usize);

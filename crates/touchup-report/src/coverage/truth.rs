@@ -1,4 +1,4 @@
-//! Which place and which feature of the true plate a stated number is of.
+//! Place and feature of the true plate behind a stated number.
 
 use nalgebra::{Point3, Vector2, Vector3};
 
@@ -8,16 +8,16 @@ use touchup_core::features::{Feature, FittedTo, InspectedQuantity, Kind, Measure
 use touchup_core::reconstruct::Support;
 use touchup_sim::{Plate, Surface, SurfacePoint, TruthFeature, TruthShape};
 
-/// A place of the surface is at an edge or a rim within this distance of it, m.
+/// Largest distance of a surface place at an edge or a rim, m.
 const NEAR_EDGE: f64 = 1e-3;
 /// Cosine of the angle of two normals beyond which the edge between them is sharp.
 const SHARP: f64 = 0.866;
-/// A found feature is the true one whose place is within this distance, m.
+/// Largest distance between a found feature and its true counterpart, m.
 const SAME: f64 = 2e-3;
-/// Cosine of the largest angle between two directions that are the same.
+/// Cosine of the largest angle between two equal directions.
 const PARALLEL: f64 = 0.9;
 
-/// The kind of a vertex; `None` for those of the scan, and where no ball reaches.
+/// The kind of a vertex; `None` for vertices of the scan, or beyond the ball's reach.
 pub(super) fn vertex_kind(
     p: &Point3<f64>,
     support: Support,
@@ -72,8 +72,7 @@ fn is_at_opening(feature: &TruthFeature, p: &Point3<f64>) -> bool {
     ((off - spine).xy().norm() - radius).hypot(off.z) <= NEAR_EDGE
 }
 
-/// The numbers of a found feature beside those of the true one; none where it is no feature of the
-/// plate.
+/// The numbers of a found feature beside the true ones; none if it is no feature of the plate.
 pub(super) fn feature_numbers(
     feature: &Feature,
     plate: &Plate,
@@ -164,7 +163,7 @@ fn of_walls(feature: &Feature, truth: &TruthFeature) -> Option<Vec<(CoverageKind
     )
 }
 
-/// The true surface at its middle, along its normal.
+/// The true surface at the plane's middle, along its normal.
 fn of_plane(feature: &Feature, plate: &Plate) -> Option<Vec<(CoverageKind, StatedNumber)>> {
     let (centre, normal) = (&feature.centre, feature.axis.as_ref()?.value);
     let mut near = Vec::new();
@@ -186,7 +185,7 @@ fn of_plane(feature: &Feature, plate: &Plate) -> Option<Vec<(CoverageKind, State
     )])
 }
 
-/// The true edge at its middle, where two sides meet.
+/// The true edge at the edge's middle, between two sides.
 fn of_edge(feature: &Feature, plate: &Plate) -> Option<Vec<(CoverageKind, StatedNumber)>> {
     let (centre, along) = (&feature.centre, feature.axis.as_ref()?.value);
     let mut near = Vec::new();
@@ -196,12 +195,12 @@ fn of_edge(feature: &Feature, plate: &Plate) -> Option<Vec<(CoverageKind, Stated
         sides_along(a, b).is_some_and(|edge| edge.dot(&along).abs() > PARALLEL)
     };
     let (a, b) = pairs.into_iter().find(is_edge)?;
-    // the two are perpendicular: each says where the edge is in one direction
+    // the two are perpendicular: each gives the edge's position in one direction
     let off = [a, b].map(|side| (centre.value - side.point).dot(&side.normal));
     Some(across(CoverageKind::EdgePosition, off.into(), centre).to_vec())
 }
 
-/// Direction of the edge between two sides; `None` where they are none, or not perpendicular.
+/// Direction of the edge between two sides; `None` without an edge, or if not perpendicular.
 fn sides_along(a: &SurfacePoint, b: &SurfacePoint) -> Option<Vector3<f64>> {
     let edge = a.normal.cross(&b.normal);
     (edge.norm() > PARALLEL).then(|| edge.normalize())

@@ -15,11 +15,11 @@ pub struct Extreme {
     pub is_right: bool,
 }
 
-/// The outcome in words, and whether it is right; an error where none would be.
+/// The outcome in words, and whether it is right; or an unexpected error.
 pub(super) type CaseOutcome<E> = Result<(String, bool), E>;
 
 impl Extreme {
-    /// Begins one with what is fed.
+    /// Starts a case with its input.
     pub(super) fn fed(fed: &str) -> Self {
         Self {
             fed: fed.to_owned(),
@@ -35,7 +35,7 @@ impl Extreme {
         }
     }
 
-    /// What came out.
+    /// The outcome.
     pub(super) fn gave<E: Display>(self, outcome: CaseOutcome<E>) -> Self {
         let (came_out, is_right) =
             outcome.unwrap_or_else(|error| (format!("refused: {error}"), false));
@@ -47,7 +47,7 @@ impl Extreme {
     }
 }
 
-/// What should be refused with a certain error.
+/// Outcome of an input that should fail with a certain error.
 pub(super) fn refused<T, E: Display>(
     result: Result<T, E>,
     is_right: impl Fn(&E) -> bool,

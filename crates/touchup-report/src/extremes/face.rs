@@ -29,17 +29,17 @@ fn paper() -> DynamicsParams {
 
 type Stepped = Result<FaceState, DynamicsError>;
 
-/// One step of a face that looks up; the tip `h` above it.
+/// One step of a face that looks up, with the tip `h` above it.
 fn step(params: DynamicsParams, h: f64, force: [f64; 3], dt: f64) -> Stepped {
     FaceDynamics::new(params)?.step(&UP, &Point3::new(0.0, 0.0, h), &force.into(), dt)
 }
 
-/// The same under a force along the normal.
+/// One such step under a force along the normal.
 fn pressed(params: DynamicsParams, h: f64, force: f64, dt: f64) -> Stepped {
     step(params, h, [0.0, 0.0, force], dt)
 }
 
-/// In words, with what must hold of it.
+/// Outcome in words, with a test of the final state.
 fn outcome(stepped: Stepped, is_right: impl Fn(&FaceState) -> bool) -> CaseOutcome<DynamicsError> {
     let face = stepped?;
     let words = format!(
@@ -50,7 +50,7 @@ fn outcome(stepped: Stepped, is_right: impl Fn(&FaceState) -> bool) -> CaseOutco
     Ok((words, is_right(&face)))
 }
 
-/// The same of a face that should be at `z` along its first normal.
+/// Outcome of a face that should come to `z` along its first normal.
 fn comes_to(stepped: Stepped, z: f64, tolerance: f64) -> CaseOutcome<DynamicsError> {
     outcome(stepped, |face| near(face.b.z, z, tolerance))
 }

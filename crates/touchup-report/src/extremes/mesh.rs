@@ -16,7 +16,7 @@ const FORCE_N: f64 = 2.0;
 /// Depth of the true surface below the scan, m.
 const DEPTH: f64 = 0.05e-3;
 const MILLISECOND_NS: i64 = 1_000_000;
-/// Where most samples touch, m.
+/// Place of most touches, m.
 const PLACE: [f64; 2] = [0.3e-3, 0.1e-3];
 
 /// Vertices and faces.
@@ -45,7 +45,7 @@ fn refiner((positions, faces): Shape) -> Result<Refiner, RefineError> {
     Refiner::new(TriMesh::new(positions, faces)?, RefineParams::robust(tip))
 }
 
-/// A ball at rest under `force`, its lowest point at `point` where nothing bends.
+/// A ball at rest under `force`, its lowest point at `point` if nothing bends.
 fn sample(tick: i64, point: Point3<f64>, radius: f64, force: Vector3<f64>) -> Sample {
     let reported = point + Vector3::z() * radius - force / STIFFNESS;
     let wrench = Wrench {
@@ -63,14 +63,13 @@ fn down() -> Vector3<f64> {
     Vector3::z() * FORCE_N
 }
 
-/// At [`PLACE`], `z` above the plane of the square.
+/// A point at [`PLACE`], `z` above the plane of the square.
 fn over(z: f64) -> Point3<f64> {
     Point3::new(PLACE[0], PLACE[1], z)
 }
 
-/// Presses for one second where the true surface is `depth` below the scan: how far down the
-/// surface is then, m, and whether the mesh is sound (all finite, no face turned over) and down to
-/// it within a fifth of the depth.
+/// Presses for one second on a true surface `depth` below the scan: final depth of the mesh, m, and
+/// whether the mesh is sound (all finite, no face turned over) and within a fifth of the depth.
 fn press(
     refiner: &mut Refiner,
     point: Point3<f64>,
@@ -91,7 +90,7 @@ fn press(
     Ok((found, is_sound && (found - depth).abs() < 0.2 * depth))
 }
 
-/// Presses at a place, the true surface [`DEPTH`] below the scan.
+/// Presses at a place, with the true surface [`DEPTH`] below the scan.
 fn pressed(shape: Shape, [x, y]: [f64; 2]) -> Outcome {
     let mut refiner = refiner(shape)?;
     let (depth, is_right) = press(&mut refiner, Point3::new(x, y, -DEPTH), RADIUS, DEPTH)?;
@@ -105,7 +104,7 @@ fn pressed(shape: Shape, [x, y]: [f64; 2]) -> Outcome {
     ))
 }
 
-/// A refused sample leaves every bit of the mesh.
+/// A refused sample leaves every bit of the mesh unchanged.
 fn unchanged(
     mut refiner: Refiner,
     bad: &Sample,
@@ -127,7 +126,7 @@ pub(super) fn rows() -> Vec<Extreme> {
 }
 
 fn samples() -> Vec<Extreme> {
-    // after a good one
+    // after a good sample
     let bad = |change: fn(&mut Sample), is_right: fn(&RefineError) -> bool| -> Outcome {
         let good = sample(5, over(-DEPTH), RADIUS, down());
         let mut bad = Sample {
@@ -167,7 +166,7 @@ fn samples() -> Vec<Extreme> {
     ]
 }
 
-/// A second of `force` with the ball above the mesh: one inside it would rightly carve.
+/// A second of `force` with the ball above the mesh: inside the mesh it would rightly carve.
 fn unmoved(force: Vector3<f64>) -> Outcome {
     let mut refiner = refiner(plain())?;
     let before = refiner.mesh().positions().to_vec();
@@ -206,7 +205,7 @@ fn paused() -> Outcome {
 
 fn shapes_and_sizes() -> Vec<Extreme> {
     let (positions, faces) = plain();
-    // one vertex more, and a face of it with two others
+    // one extra vertex, and a face of it with two others
     let with = |corner: Point3<f64>, [a, b]: [u32; 2]| {
         let added = [a, b, positions.len() as u32];
         (
@@ -214,7 +213,7 @@ fn shapes_and_sizes() -> Vec<Extreme> {
             [&faces[..], &[added]].concat(),
         )
     };
-    // a face of one edge, laid along a side in the middle; a fin on an edge of two faces
+    // a face of one edge, along a side in the middle; a fin on an edge of two faces
     let flat = with(
         positions[24] + (positions[25] - positions[24]) * 0.5,
         [24, 25],
@@ -269,7 +268,7 @@ fn far_away() -> Outcome {
 
 fn tiny() -> Outcome {
     let (edge, radius, depth) = (2e-7, 1e-7, 5e-9);
-    // a probe so stiff that it does not bend by more than such a mesh is large
+    // a probe so stiff that it bends by less than the size of the mesh
     let stiffness = 2e9;
     let params = RefineParams::robust(TipParams {
         radius,

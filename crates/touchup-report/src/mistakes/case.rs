@@ -1,5 +1,5 @@
-//! One seed of one world: scan and recording in memory, sound and with mistakes, checked as
-//! `touchup doctor` does.
+//! One seed of one world: scan and recording in memory, sound and with mistakes, through the checks
+//! of `touchup doctor`.
 
 use super::checked::CheckedRecording;
 use crate::error::Measured;
@@ -9,7 +9,7 @@ use touchup_core::stylus::{ContactEstimator, ContactEstimatorParams, Synchronise
 use touchup_session::scene::Scene;
 use touchup_sim::{DrawnWorld, InputMistake, Plate, SimWorld, ToldRecording};
 
-/// What is said of the sound recording, and of each that a mistake makes of it.
+/// Findings for the sound recording, and for each mistaken variant.
 pub(super) fn run(
     world: SimWorld,
     seed: u64,

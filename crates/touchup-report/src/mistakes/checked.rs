@@ -1,24 +1,24 @@
-//! A recording and what was said of it.
+//! A recording and its findings.
 
 use touchup_core::diagnose::InputFinding;
 use touchup_sim::{InputMistake, SimWorld};
 
-/// What was said of one recording.
+/// Findings for one recording.
 #[derive(Clone, Debug)]
 pub struct CheckedRecording {
-    /// whose it is
+    /// world of the recording
     pub world: SimWorld,
-    /// of the world
+    /// seed of the world
     pub seed: u64,
-    /// `None`: it is sound
+    /// mistake in the recording; `None`: sound
     pub mistake: Option<&'static InputMistake>,
-    /// the surest first
+    /// most certain first
     pub findings: Vec<InputFinding>,
 }
 
 impl CheckedRecording {
-    /// Whether the mistake is what is said first, and surely; of a sound recording, that nothing is
-    /// said.
+    /// Whether the first finding is the mistake, and sure; for a sound recording, whether findings
+    /// are absent.
     pub fn is_right(&self) -> bool {
         match (self.mistake, self.findings.first()) {
             (None, first) => first.is_none(),
@@ -28,7 +28,7 @@ impl CheckedRecording {
         }
     }
 
-    /// What is said first; empty for nothing.
+    /// First finding; empty without findings.
     pub fn said(&self) -> String {
         self.findings
             .first()
@@ -36,17 +36,17 @@ impl CheckedRecording {
     }
 }
 
-/// How many of some recordings were judged rightly.
+/// Count of correct judgements.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RightCount {
-    /// judged rightly
+    /// correct judgements
     pub right: usize,
-    /// of all
+    /// all recordings
     pub all: usize,
 }
 
 impl RightCount {
-    /// Of these.
+    /// Counts these recordings.
     pub fn of<'a>(checked: impl Iterator<Item = &'a CheckedRecording>) -> Self {
         checked.fold(Self::default(), |count, checked| Self {
             right: count.right + usize::from(checked.is_right()),

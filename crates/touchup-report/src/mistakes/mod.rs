@@ -1,8 +1,8 @@
-//! What is said of wrong input: recordings of named worlds, sound and with one mistake each,
-//! through the checks of `touchup doctor`.
+//! Findings for wrong input: recordings of named worlds, sound and with one mistake each, through
+//! the checks of `touchup doctor`.
 //!
-//! A world draws its truth from a seed, and the program is told what a calibration leaves of it
-//! ([`SimWorld`]): its scene is what `touchup simulate --world` writes.
+//! A world draws its truth from a seed; the program learns the part of it that a calibration leaves
+//! ([`SimWorld`]), in the scene that `touchup simulate --world` writes.
 
 mod case;
 mod checked;
@@ -15,14 +15,14 @@ pub use checked::{CheckedRecording, RightCount};
 use super::Effort;
 use touchup_sim::{INPUT_MISTAKES, SimWorld};
 
-/// What is run.
+/// Extent of the runs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MistakesParams {
-    /// in this order
+    /// worlds, in this order
     pub worlds: Vec<SimWorld>,
-    /// of each world, with each mistake
+    /// seeds of each world, with each mistake
     pub seeds: RangeInclusive<u64>,
-    /// so many times as many seeds after those are looked at without a mistake alone
+    /// number of further seeds without mistakes, as a multiple of the count of `seeds`
     pub more_sound: u64,
     /// longest time of the rasters over the part, s
     pub longest: f64,
@@ -40,18 +40,18 @@ impl MistakesParams {
     }
 }
 
-/// All recordings, with what was said of them.
+/// All recordings with their findings.
 #[derive(Clone, Debug)]
 pub struct Mistakes {
-    /// what was run
+    /// extent of the runs
     pub params: MistakesParams,
     /// by world and seed, the sound one first
     pub checked: Vec<CheckedRecording>,
-    /// a recording that could not be made, in words
+    /// failed recordings, in words
     pub failed: Vec<String>,
 }
 
-/// The share of mistakes whose cause is to be named.
+/// Demanded share of mistakes with the right cause.
 pub const LEAST_NAMED: f64 = 0.95;
 
 /// Checks each seed of each world, without a mistake and with each.

@@ -7,7 +7,7 @@ use itertools::Itertools;
 use touchup_sim::{INPUT_MISTAKES, InputMistake, SimWorld};
 
 impl Mistakes {
-    /// As a part of the report.
+    /// Chapter of the report.
     pub fn chapter(&self) -> Chapter {
         let text = std::iter::once(self.introduction()).chain(not_run(&self.failed));
         let tables = vec![self.named(), self.sound(), self.missed()];
@@ -19,7 +19,7 @@ impl Mistakes {
         )
     }
 
-    /// Those with a mistake, and those without.
+    /// Counts for recordings with a mistake, and without.
     pub fn counts(&self) -> [RightCount; 2] {
         let checked = self.checked.iter();
         let (made, sound): (Vec<_>, Vec<_>) =

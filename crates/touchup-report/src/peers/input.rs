@@ -8,11 +8,11 @@ use touchup_core::haptic::{RefineError, RefineParams, Refiner, TipParams};
 use touchup_core::mesh::{FaceTree, MeshError, Nearby, TriMesh};
 use touchup_sim::wavy::{RADIUS, SIDE, STIFFNESS, contact_on, slide, wavy_plate};
 
-/// Farther than any query from the plate, m.
+/// Search radius beyond any query's distance from the plate, m.
 const REACH: f64 = 0.01;
-/// Pushes before those that count.
+/// Warm-up pushes.
 const WARM: usize = 2_000;
-/// Of the raster, m.
+/// Width of the raster, m.
 const WIDTH: f64 = 0.8 * SIDE;
 
 /// Mesh, queries and samples of one size.
@@ -21,15 +21,15 @@ pub struct PeersInput {
     /// the plate
     pub mesh: TriMesh,
     queries: Vec<Point3<f64>>,
-    /// of each query from the plate, m
+    /// distance of each query from the plate, m
     pub distances: Vec<f64>,
 }
 
 impl PeersInput {
-    /// About so many faces, and the queries with their distances.
+    /// A plate of about `faces` faces, and the queries with their distances.
     ///
     /// # Errors
-    /// Those of [`wavy_plate`].
+    /// Errors of [`wavy_plate`].
     pub fn new(faces: usize, effort: Effort) -> Result<Self, MeshError> {
         let mesh = wavy_plate(faces)?;
         let queries: Vec<_> = (0..effort.choose(1_000, 4_000))
@@ -48,8 +48,8 @@ impl PeersInput {
         })
     }
 
-    /// What the script reads, with the names of the files: V × 3 and Q × 3 doubles in m, F × 3
-    /// integers, all little-endian.
+    /// Input files of the script by name: V × 3 and Q × 3 doubles in m, F × 3 integers, all
+    /// little-endian.
     pub fn files(&self) -> [(&'static str, Vec<u8>); 3] {
         let corners = self.mesh.faces().flat_map(|(_, corners)| corners);
         [
@@ -67,7 +67,7 @@ impl PeersInput {
     /// - `turn`: "before" the peers or "after" them.
     ///
     /// # Errors
-    /// Those of [`Refiner::new`] and [`Refiner::push`]: none is expected.
+    /// Errors of [`Refiner::new`] and [`Refiner::push`]: none is expected.
     pub fn measure(&self, turn: &str) -> Result<PeerTimes, RefineError> {
         let tree = FaceTree::new(&self.mesh);
         let (mut queries, mut next) = (Vec::new(), Vec::new());

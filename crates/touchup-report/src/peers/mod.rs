@@ -1,8 +1,8 @@
-//! Against what a user would take instead: libraries from PyPI, on the same mesh, with the same
+//! Comparison with alternatives for users: libraries from PyPI, on the same mesh, with the same
 //! queries, on one thread.
 //!
-//! Here are the input, touchup's own times, the script that measures the peers, and the comparison.
-//! Files and processes are the matter of the command line.
+//! This module has the input, touchup's own times, the script that measures the peers, and the
+//! comparison. The command line handles files and processes.
 
 mod input;
 mod text;
@@ -26,39 +26,38 @@ pub const PACKAGES: [&str; 7] = [
     // without it trimesh has no tree
     "rtree==1.4.1",
 ];
-/// The factor that is aimed at, per sample.
+/// Target factor, per sample.
 pub const WANTED_FACTOR: f64 = 100.0;
-/// A distance that differs by more than this share is another answer.
+/// Largest relative difference of two equal distances.
 pub const AGREEMENT: f64 = 1e-9;
 
-/// One peer as the script reports it, or touchup itself.
+/// Times of one peer from the script, or of touchup itself.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 pub struct PeerTimes {
-    /// which
+    /// name
     pub peer: String,
-    /// of what it is made of; of touchup nothing
+    /// versions of its libraries; empty for touchup
     pub versions: String,
-    /// how its index is kept true
+    /// update method of its index
     pub update: String,
     /// one closest face per call, µs
     pub query_us: Spread,
-    /// the same in one call for all, µs for each; where it can. Of touchup one near the last
+    /// one call for all, µs for each, if supported. For touchup a query near the last
     pub batched_query_us: Option<Spread>,
-    /// closest face, ring moved, index true again, µs. Of touchup a whole push: filter, gate,
+    /// closest face, ring moved, index exact again, µs. For touchup a whole push: filter, gate,
     /// closest face, dynamics, deformation, guard, tree
     pub pipeline_us: Spread,
-    /// distances, m; none where it has no closest-face query
+    /// distances, m; empty without a closest-face query
     distances_m: Vec<Option<f64>>,
-    /// largest difference from touchup's distance, relative; `None` where it does not look for the
-    /// closest face
+    /// largest difference from touchup's distance, relative; `None` without a closest-face query
     #[serde(skip)]
     pub largest_difference: Option<f64>,
 }
 
-/// A peer that could not be measured.
+/// Failed measurement of a peer.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 pub struct PeerError {
-    /// which
+    /// name
     pub peer: String,
     /// its output
     pub error: String,
@@ -67,13 +66,13 @@ pub struct PeerError {
 /// All peers on one mesh.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PeersAtSize {
-    /// of the mesh
+    /// faces of the mesh
     pub faces: usize,
     /// touchup before the peers and after them
     pub touchup: [PeerTimes; 2],
-    /// as measured
+    /// peers with times
     pub peers: Vec<PeerTimes>,
-    /// those that were not
+    /// failed peers
     pub failed: Vec<PeerError>,
 }
 
@@ -84,11 +83,11 @@ pub struct Peers {
     pub sizes: Vec<PeersAtSize>,
 }
 
-/// One line of the script that is neither times nor a failure.
+/// A line of the script that is neither times nor a failure.
 #[derive(Debug, thiserror::Error)]
 #[error("the peers' script said {line:?}: {error}")]
 pub struct UnknownLine {
-    /// as it came
+    /// the line verbatim
     pub line: String,
     /// the error
     pub error: serde_json::Error,
@@ -103,7 +102,7 @@ impl PeerTimes {
 }
 
 impl PeersAtSize {
-    /// Reads what the script printed, and compares its distances with those of `input`.
+    /// Parses the script's output, and compares its distances with the distances of `input`.
     ///
     /// # Errors
     /// [`UnknownLine`]
@@ -145,8 +144,8 @@ impl PeersAtSize {
             .fold(0.0, f64::max)
     }
 
-    /// The fastest pipeline whose index is exact. Of Open3D single precision is taken for exact,
-    /// and so is the nearest barycentre for what it asks: the strictest comparison.
+    /// The fastest pipeline with an exact index. Open3D's single precision counts as exact, and so
+    /// does the nearest barycentre for its own query: the strictest comparison.
     pub fn fastest_pipeline(&self) -> Option<&PeerTimes> {
         let is_sound = |times: &&PeerTimes| {
             times
@@ -164,12 +163,12 @@ impl PeersAtSize {
             .min_by(|a, b| a.query_us.median.total_cmp(&b.query_us.median))
     }
 
-    /// How many times faster a push is than the fastest pipeline.
+    /// Speed-up of a push over the fastest pipeline.
     pub fn pipeline_factor(&self) -> Option<f64> {
         Some(self.fastest_pipeline()?.pipeline_us.median / self.push_us())
     }
 
-    /// How many times faster a whole push is than the fastest query alone.
+    /// Speed-up of a whole push over the fastest query alone.
     pub fn query_factor(&self) -> Option<f64> {
         Some(self.fastest_query()?.query_us.median / self.push_us())
     }

@@ -51,7 +51,7 @@ fn verdicts(size: &PeersAtSize) -> Vec<String> {
 }
 
 fn table(peers: &Peers) -> Table {
-    // with the push that a peer is compared with
+    // with touchup's push for comparison
     let rows = peers.sizes.iter().flat_map(|size| {
         let ours = size
             .touchup

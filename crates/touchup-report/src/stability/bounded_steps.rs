@@ -1,4 +1,4 @@
-//! The step with a bound on its error against the solution in numbers of 32 digits.
+//! The error-bounded step against the solution in numbers of 32 digits.
 
 use nalgebra::{Point3, Unit, UnitQuaternion, Vector3};
 use rand::{RngExt, SeedableRng};
@@ -11,7 +11,7 @@ use touchup_core::haptic::{
     Along, ContactModel, DynamicsError, DynamicsParams, FaceDynamics, FaceState, StepRule,
 };
 
-/// Roundings of |F| and of the distance of the tip, which the step cannot undo.
+/// Roundings of |F| and of the tip's distance, beyond the step's control.
 const ROUNDINGS: f64 = 8.0 * f64::EPSILON;
 
 /// The largest errors over the bound in one group of samples.
@@ -19,21 +19,21 @@ const ROUNDINGS: f64 = 8.0 * f64::EPSILON;
 pub struct BoundedStepError {
     /// contact model and direction of motion
     pub name: String,
-    /// compared
+    /// cases compared
     pub cases: usize,
-    /// refused by the step without need
+    /// unnecessary refusals by the step
     pub refused: usize,
-    /// refused because roundings decide where the face goes
+    /// refusals because roundings decide the direction of the face
     pub undetermined: usize,
     /// without a reference: the path leaves the range of numbers
     pub without_reference: usize,
-    /// where the roundings of the input alone do more than the bound; compared with what they do
+    /// cases over the bound, judged again with the effect of the input's roundings added
     pub ill_conditioned: usize,
-    /// of the position, over the bound
+    /// error of the position, over the bound
     pub position: f64,
-    /// of the normal, over the bound
+    /// error of the normal, over the bound
     pub normal: f64,
-    /// where the larger of both was
+    /// case of the larger error
     pub worst: String,
 }
 
@@ -122,7 +122,7 @@ fn draw(rng: &mut Pcg64, is_spring: bool, along: Along) -> HeldFace {
             delta: 5.0,
         }
     };
-    // a spring that pulls turns the face away from the force without end: milder
+    // a pulling spring turns the face away from the force without end: milder
     let turning = if is_spring { -3.0..2.0 } else { -3.0..6.0 };
     let stiffness = if is_spring { -1.0..5.0 } else { -1.0..9.0 };
     let params = DynamicsParams {
@@ -133,7 +133,7 @@ fn draw(rng: &mut Pcg64, is_spring: bool, along: Along) -> HeldFace {
         along,
         take_out_rigid_offset: false,
     };
-    // a spring along n*(0) whose face turns beyond a right angle runs away exponentially
+    // a spring along n*(0) with a face turned beyond a right angle diverges exponentially
     let widest = if is_spring { 1.3 } else { 2.8 };
     let tilt: f64 = rng.random_range(1e-3..widest);
     let depth = if is_spring {
@@ -169,7 +169,7 @@ fn stepped(held: &HeldFace) -> Result<FaceState, DynamicsError> {
     dynamics.step(&face, &Point3::from(held.arm), &held.force, held.dt_s)
 }
 
-/// Of position and normal, over what is allowed for each.
+/// Errors of position and normal, over the allowed ones.
 fn errors(face: &FaceState, reference: &Reference, allowed: [f64; 2]) -> [f64; 2] {
     [
         (face.b - reference.face.b).norm() / allowed[0],
@@ -177,8 +177,8 @@ fn errors(face: &FaceState, reference: &Reference, allowed: [f64; 2]) -> [f64; 2
     ]
 }
 
-/// The same, where the bound and what roundings of |F| and of the tip's place do to the reference
-/// are allowed.
+/// Errors over the bound plus the effect of roundings of |F| and of the tip's place on the
+/// reference.
 fn errors_beside_roundings(held: &HeldFace, face: &FaceState, reference: &Reference) -> [f64; 2] {
     let away = held.normal * (held.arm.norm() + 5.0 * length_scale(&held.params.model)) * ROUNDINGS;
     let moved = [
@@ -199,7 +199,7 @@ fn errors_beside_roundings(held: &HeldFace, face: &FaceState, reference: &Refere
     errors(face, reference, allowed)
 }
 
-/// Of a sigmoid: its width, m, whose shift meets the distance in one sum.
+/// Width of a sigmoid, m, whose shift shares a sum with the distance.
 fn length_scale(model: &ContactModel) -> f64 {
     match *model {
         ContactModel::Sigmoid { h_min_m, .. } => h_min_m,

@@ -10,12 +10,12 @@ use touchup_core::names;
 
 /// Samples held in each run.
 const STEPS: usize = 6;
-/// The faces that a refiner lets a force move: 78° at most between force and normal.
+/// Least cosine between normal and force for which a refiner lets a force move a face: 78° at most.
 const SMALLEST_COSINE: f64 = 0.2;
-/// |n| may be off by this.
+/// Tolerance of |n|.
 const UNIT_TOLERANCE: f64 = 1e-9;
-/// What counts as crossing, relative to the lengths of the run: far above roundings, far below what
-/// is seen.
+/// Least crossing that counts, relative to the lengths of the run: far above roundings, far below
+/// observed ones.
 const CROSSING: f64 = 1e-9;
 
 /// Decades of a parameter: its logarithms.
@@ -32,10 +32,10 @@ const BETA: Decades = -7.0..5.0;
 pub(super) const STEP: Decades = -9.0..3.0;
 
 names! {
-    /// How a run ended.
+    /// End of a run.
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
     pub enum RunEnding {
-        /// none of those below
+        /// no fault
         Stable = "stable",
         /// the integrator refused or gave up
         GaveUp = "gave up",
@@ -56,7 +56,7 @@ names! {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FaceRun {
     pub params: DynamicsParams,
-    /// h_min, m; of the spring: f_max over its stiffness
+    /// h_min, m; for the spring: f_max over its stiffness
     pub h_min: f64,
     pub f_max: f64,
     n: Vector3<f64>,
@@ -68,9 +68,9 @@ pub(super) fn log_uniform(rng: &mut Pcg64, decades: Decades) -> f64 {
 }
 
 impl FaceRun {
-    /// Draws the parameters of a run; `is_spring`: of the two contact models the linear one. A
-    /// spring pulls a tip outside the face, and Eq 7 would turn the face away from the force there:
-    /// with a spring the normal turns at a rate of its own, as in
+    /// Draws the parameters of a run; `is_spring` selects the linear one of the two contact models.
+    /// A spring pulls a tip outside the face, and Eq 7 would turn the face away from the force
+    /// there: with a spring the normal turns at a rate of its own, as in
     /// [`touchup_core::haptic::RefineParams::robust`].
     pub fn draw(rng: &mut Pcg64, is_spring: bool) -> Self {
         let (h_min, f_max) = (log_uniform(rng, H_MIN), log_uniform(rng, F_MAX));
@@ -94,7 +94,7 @@ impl FaceRun {
             take_out_rigid_offset: !is_spring,
             ..DynamicsParams::default()
         };
-        // z is along n first, then all is turned to where it may
+        // first with z along n, then all turned into the drawn direction
         let cosine: f64 = if rng.random_bool(0.25) {
             1.0
         } else {
@@ -125,7 +125,7 @@ impl FaceRun {
         }
     }
 
-    /// How stiff the position is, α f_max dt / h_min, and the normal, β f_max² dt or rate times dt.
+    /// Stiffness of position, α f_max dt / h_min, and normal, β f_max² dt or rate times dt.
     pub fn stiffness(&self) -> [f64; 2] {
         let turning = (self.params.beta_per_n2_s * self.f_max * self.f_max + self.held.turning)
             * self.held.dt;
@@ -144,8 +144,8 @@ impl FaceRun {
         }
     }
 
-    /// How it ends, and whether the integrator itself kept |n| = 1: a normal whose length is off is
-    /// set to 1 after each step, as anybody would do.
+    /// End of the run, and whether the integrator itself kept |n| = 1: after each step a normal of
+    /// wrong length is normalised, as in any usual implementation.
     pub fn judge(&self, integrator: Integrator) -> (RunEnding, bool) {
         let mut kept_unit = true;
         (self.run(integrator, &mut kept_unit), kept_unit)
@@ -184,8 +184,8 @@ impl FaceRun {
         RunEnding::Stable
     }
 
-    /// Whether h goes over its rest point. That lies elsewhere for the normal before and after: it
-    /// counts only where it is crossed for both.
+    /// Whether h crosses its rest point. The rest point differs for the normals before and after: a
+    /// crossing counts only if it holds for both.
     fn crosses(
         &self,
         n: &Vector3<f64>,
@@ -198,8 +198,8 @@ impl FaceRun {
     }
 }
 
-/// Whether a distance to the rest point changes its sign, for the normal before and for that after,
-/// and by more than `tolerance`.
+/// Whether a distance to the rest point changes its sign, for the normals before and after, and by
+/// more than `tolerance`.
 pub(super) fn goes_over(from: [f64; 2], to: [f64; 2], tolerance: f64) -> bool {
     let over = |sign: f64| {
         from.iter().all(|x| sign * x >= 0.0) && to.iter().all(|x| sign * x < -tolerance)

@@ -1,4 +1,4 @@
-//! The integrators of the map: what a user would write first, and the steps of [`FaceDynamics`].
+//! Integrators of the map: the obvious first choices, and the steps of [`FaceDynamics`].
 
 use nalgebra::{Matrix4, Vector3, Vector4};
 
@@ -8,9 +8,9 @@ use touchup_core::names;
 
 /// Most Newton iterations of the implicit step.
 const NEWTON_STEPS: usize = 50;
-/// It has converged where the next step is below this share of the scale.
+/// Convergence: the next step is below this share of the scale.
 const NEWTON_TOLERANCE: f64 = 1e-12;
-/// Differences for its Jacobian: half of the digits.
+/// Relative difference for its Jacobian: half of the digits.
 const DIFFERENCE: f64 = 1e-8;
 
 names! {
@@ -21,13 +21,13 @@ names! {
         ExplicitEuler = "explicit Euler",
         /// one classical Runge–Kutta step of order 4 a sample
         RungeKutta4 = "RK4",
-        /// adaptive Runge–Kutta 5(4), as many steps as it takes, up to 20,000
+        /// adaptive Runge–Kutta 5(4), up to 20,000 steps
         DormandPrince = "Dormand-Prince 5(4)",
         /// one implicit Euler step a sample, solved by Newton's method
         ImplicitEuler = "implicit Euler",
-        /// the exact flow of the position, then that of the normal: the default
+        /// the exact flow of the position, then of the normal: the default
         Lie = "Lie",
-        /// the same with the drift of one in the other
+        /// the exact flows with mutual drift
         DriftCorrected = "drift-corrected",
     }
 }
@@ -41,17 +41,17 @@ pub(super) struct HeldSample {
     pub force: Vector3<f64>,
     /// s
     pub dt: f64,
-    /// rate at which n turns to the force whatever the forces, 1/s: Eq 7 with both at unit size
+    /// force-independent rate at which n turns to F, 1/s: Eq 7 with both forces at unit size
     pub turning: f64,
 }
 
-/// The travel along the force, m, and the normal, whatever its length.
+/// Travel along the force, m, and normal of any length.
 type Moved = (f64, Vector3<f64>);
-/// The same as one vector.
+/// Travel and normal as one vector.
 type Unknowns = Vector4<f64>;
 
 impl Integrator {
-    /// As the end of a file name: the words of its name.
+    /// Suffix of a file name: the words of its name.
     pub fn id(self) -> String {
         let name = self.name().to_lowercase();
         let words = name
@@ -70,7 +70,7 @@ impl Integrator {
         }
     }
 
-    /// Where the face is after one sample; `None` where it gives up.
+    /// State of the face after one sample; `None` if the integrator gives up.
     pub(super) fn step(
         self,
         params: &DynamicsParams,
@@ -141,7 +141,7 @@ fn rate(params: &DynamicsParams, held: &HeldSample, y: &Unknowns) -> Unknowns {
     )
 }
 
-/// The length that counts, m.
+/// Characteristic length, m.
 fn scale(params: &DynamicsParams, held: &HeldSample) -> f64 {
     let of_model = match params.model {
         ContactModel::Sigmoid { h_min_m, .. } => h_min_m,
@@ -150,8 +150,8 @@ fn scale(params: &DynamicsParams, held: &HeldSample) -> f64 {
     held.arm.norm() + of_model
 }
 
-/// y = y₀ + dt · rate(y) by Newton's method with a Jacobian of differences; a step that makes it
-/// worse is halved.
+/// Solves y = y₀ + dt · rate(y) by Newton's method with a difference Jacobian; halves a step that
+/// increases the residual.
 fn implicit_euler(
     start: &Unknowns,
     dt: f64,
@@ -199,8 +199,8 @@ mod tests {
     use super::*;
     use touchup_core::haptic::Along;
 
-    /// A spring from h = 1 mm to rest at 0 without force along n: dh/dt = −h/τ, whose solution and
-    /// whose discrete steps are known.
+    /// A spring from h = 1 mm to rest at 0 without force along n: dh/dt = −h/τ, with known solution
+    /// and known discrete steps.
     #[test]
     fn each_step_is_its_own_rule_on_a_linear_decay() {
         let model = ContactModel::Spring {

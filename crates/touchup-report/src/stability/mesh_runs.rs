@@ -15,22 +15,22 @@ use touchup_core::stylus::{Sample, Wrench};
 const CELLS: u32 = 12;
 /// Samples in each run.
 const SAMPLES: i64 = 30;
-/// Of the ball, m.
+/// Radius of the ball, m.
 const RADIUS: f64 = 1.5e-3;
-/// Of the probe, N/m.
+/// Stiffness of the probe, N/m.
 const STIFFNESS: f64 = 2e4;
-/// Crossing of the rest point that counts, m.
+/// Least crossing of the rest point that counts, m.
 const CROSSING: f64 = 1e-9;
 /// Decades of the quality: from one in a thousand to one.
 pub(super) const QUALITY: std::ops::Range<f64> = -3.0..0.0;
 
 names! {
-    /// How a triangle is degenerate.
+    /// Kind of degenerate triangle.
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
     pub enum BadShape {
         /// two long sides and a short one
         Needle = "needles",
-        /// one long side and two that lie on it nearly
+        /// one long side with the other two almost on it
         Sliver = "slivers",
     }
 }
@@ -38,7 +38,7 @@ names! {
 /// One press on one sheet.
 #[derive(Clone, Debug)]
 pub(super) struct MeshRun {
-    /// altitude over longest side of all triangles; 0.87 where they are equilateral
+    /// altitude over longest side of all triangles; 0.87 for equilateral ones
     pub quality: f64,
     /// relaxation over one step: α k dt
     pub stiffness: f64,
@@ -76,8 +76,8 @@ impl MeshRun {
         }
     }
 
-    /// A flat sheet of equal triangles with sides of `edge` at most, curled a little: no two
-    /// normals are the same.
+    /// A flat sheet of equal triangles with sides of at most `edge`, slightly curled: all normals
+    /// differ.
     fn sheet(&self) -> TriMesh {
         let height = self.quality * self.edge;
         let is_sliver = self.shape == BadShape::Sliver;
@@ -105,7 +105,7 @@ impl MeshRun {
             .unwrap_or_else(|error| unreachable!("the sheet is sound: {error}"))
     }
 
-    /// Presses, and watches the mesh.
+    /// Presses, and judges the mesh.
     pub fn judge(&self) -> RunEnding {
         let mesh = self.sheet();
         let mut params = RefineParams::robust(TipParams {
@@ -167,11 +167,11 @@ impl MeshRun {
     }
 }
 
-/// The face that is pressed, as one sample left it: its barycentre and its normal.
+/// The pressed face after one sample: its barycentre and its normal.
 type PressedFace = (FaceId, Point3<f64>, Vector3<f64>);
 
-/// Whether the face went over its rest point from one sample to the `next`: for the normal before
-/// and for that after.
+/// Whether the face crossed its rest point from one sample to the `next`, for the normals before
+/// and after.
 fn crosses(
     last: PressedFace,
     next: PressedFace,
@@ -185,7 +185,7 @@ fn crosses(
     last.0 == next.0 && goes_over(from, to, CROSSING)
 }
 
-/// Finite, with unit normals that point where they did.
+/// Checks for finite positions, and unit normals in their old directions.
 fn sound(mesh: &TriMesh, before: &[Vector3<f64>]) -> RunEnding {
     if !mesh
         .positions()

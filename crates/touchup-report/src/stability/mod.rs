@@ -24,24 +24,24 @@ use face_runs::FaceRun;
 use mesh_runs::MeshRun;
 use shares::{share, share_map, stable_from, stable_up_to};
 
-/// An exact sub-flow may be off by this share of its scale.
+/// Largest error of an exact sub-flow, as a share of its scale.
 pub const LARGEST_SUB_FLOW_ERROR: f64 = 1e-10;
 /// Same report on every machine.
 const SEED: u64 = 4;
-/// Of position and normal, in the maps: powers of ten.
+/// Stiffness of position and normal in the maps: powers of ten.
 const STIFFNESS: std::ops::Range<f64> = -12.0..12.0;
 
-/// How the runs of one integrator on one face ended.
+/// Ends of the runs of one integrator on one face.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FaceShares {
-    /// which
+    /// integrator
     pub integrator: Integrator,
-    /// of all runs
+    /// counts over all runs
     pub endings: EndingCounts,
-    /// share in which the integrator itself kept |n| = 1, before it was set to 1
+    /// share in which the integrator itself kept |n| = 1, before normalisation
     pub unit_share: f64,
     /// largest α f_max dt / h_min below which all runs are stable, in the columns of the map;
-    /// `None` where not even the first is
+    /// `None` if even the first column is not
     pub stable_up_to: Option<f64>,
     /// x: α f_max dt / h_min, y: β f_max² dt; for the sigmoid and for the spring
     pub by_stiffness: [Panel; 2],
@@ -49,16 +49,16 @@ pub struct FaceShares {
     pub by_step: Panel,
 }
 
-/// How the runs of the default, Lie in the robust mode, on whole meshes ended. The mode turns the
+/// Ends of the runs of the default, Lie in the robust mode, on whole meshes. The mode turns the
 /// normal by itself, so that the drift-corrected step is the same there.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MeshShares {
-    /// of the triangles
+    /// shape of the triangles
     pub shape: BadShape,
-    /// of all runs
+    /// counts over all runs
     pub endings: EndingCounts,
     /// smallest altitude over longest side from which on all runs are stable, in the rows of the
-    /// map; `None` where not even the last is
+    /// map; `None` if even the last row is not
     pub stable_from_quality: Option<f64>,
     /// x: α k dt, y: altitude over longest side
     pub by_quality: Panel,
@@ -73,7 +73,7 @@ pub struct Stability {
     pub meshes: Vec<MeshShares>,
     /// one for each sub-flow and regime
     pub sub_flows: Vec<SubFlowError>,
-    /// of the step with an error bound, one for each contact model and direction
+    /// errors of the error-bounded step, one for each contact model and direction
     pub bounded_steps: Vec<BoundedStepError>,
 }
 
@@ -82,7 +82,7 @@ pub fn stability(effort: Effort, progress: &mut dyn FnMut(&str)) -> Stability {
     let runs = effort.choose(12_000, 150_000);
     let faces = Integrator::ALL.map(|integrator| {
         progress(&format!("stability map, {}", integrator.name()));
-        // where it is stiff this one takes ten milliseconds for nothing
+        // in stiff cases this integrator takes ten milliseconds for nothing
         let runs = if integrator == Integrator::DormandPrince {
             effort.choose(400, 4_000)
         } else {
@@ -174,8 +174,8 @@ impl Stability {
         of_default.all(|shares| shares.endings.stable_share() == 1.0)
     }
 
-    /// The smallest altitude over longest side from which on no press of the default was at fault;
-    /// `None` where all shapes are.
+    /// The smallest altitude over longest side from which on every press of the default is stable;
+    /// `None` if even the best quality is not.
     pub fn default_stable_from_quality(&self) -> Option<f64> {
         self.meshes
             .iter()
@@ -184,7 +184,7 @@ impl Stability {
             .flatten()
     }
 
-    /// Whether the step with an error bound kept it in every sample, and refused none.
+    /// Whether the error-bounded step kept its bound in every sample, and refused none.
     pub fn is_bound_kept(&self) -> bool {
         self.bounded_steps
             .iter()

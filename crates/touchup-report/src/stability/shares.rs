@@ -1,4 +1,4 @@
-//! Counts of runs, altogether and on a grid of two quantities.
+//! Counts of runs, in total and on a grid of two quantities.
 
 use std::ops::Range;
 
@@ -8,10 +8,10 @@ use crate::Panel;
 /// Columns and rows of a map.
 const CELLS: usize = 12;
 
-/// Share of stable runs over two quantities between powers of ten; what lies beyond the rim counts
-/// in its cells.
+/// Share of stable runs over two quantities between powers of ten; runs beyond the rim count in its
+/// cells.
 ///
-/// - `runs`: both quantities of each, and how it ended.
+/// - `runs`: both quantities of each, and its end.
 pub(super) fn share_map(
     name: &str,
     [x, y]: [&Range<f64>; 2],
@@ -69,7 +69,7 @@ pub(super) fn stable_from(map: &Panel) -> Option<f64> {
     Some(map.ys.iter().rev().take(stable).next_back()? / half)
 }
 
-/// How many runs ended in each way; the first fault of a run counts.
+/// Counts of the run endings; the first fault of a run counts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct EndingCounts([usize; RunEnding::ALL.len()]);
 
@@ -82,17 +82,17 @@ impl EndingCounts {
         counts
     }
 
-    /// How many runs there were.
+    /// Number of runs.
     pub fn runs(&self) -> usize {
         self.0.iter().sum()
     }
 
-    /// How many of them ended so.
+    /// Number of runs with this ending.
     pub fn count(&self, ending: RunEnding) -> usize {
         self.0[ending as usize]
     }
 
-    /// Share of the stable ones.
+    /// Share of stable runs.
     pub fn stable_share(&self) -> f64 {
         share(self.count(RunEnding::Stable), self.runs())
     }
@@ -117,9 +117,9 @@ mod tests {
         assert_eq!(map.shares[2 * CELLS + 3], Some(0.5));
         assert_eq!(map.shares[11 * CELLS], Some(1.0));
         assert_eq!(map.shares.iter().flatten().count(), 2);
-        // columns 0, 1, 2 hold nothing that is not stable
+        // columns 0, 1, 2 hold stable runs alone
         assert!((stable_up_to(&map).unwrap().log10() - 3.0).abs() < 1e-12);
-        // and so do rows 3 to 11
+        // and rows 3 to 11 too
         assert!((stable_from(&map).unwrap().log10() - 3.0).abs() < 1e-12);
     }
 }

@@ -9,14 +9,14 @@ use super::face_runs::log_uniform;
 use crate::double_double::Double2;
 use touchup_core::haptic::{Along, ContactModel, DynamicsParams, FaceDynamics, FaceState};
 
-/// Halvings of the bracket: from 1e9 to below a rounding of what is left.
+/// Halvings of the bracket: from 1e9 to below a rounding of the residual.
 const BISECTIONS: usize = 140;
-/// Exponentials of more are too near to the largest number.
+/// Largest exponent without overflow risk.
 const LARGEST_EXPONENT: f64 = 690.0;
-/// Nearer to the opposite of the force than this a normal is not compared, rad: the force as it was
-/// given is off by a rounding, and turning away from it makes 1e-11 of that.
+/// Least angle between a compared normal and the force's opposite, rad, in decades: the given force
+/// is off by a rounding, and turning away from it makes 1e-11 of that.
 const NEAREST_OPPOSITE: std::ops::Range<f64> = -5.0..-1.0;
-/// Without rounding of the input: lengths in units of h_min, forces of f_max, times of h_min/(α
+/// Model without input roundings: lengths in units of h_min, forces of f_max, times of h_min/(α
 /// f_max).
 const UNIT_MODEL: ContactModel = ContactModel::Sigmoid {
     f_max_n: 1.0,
@@ -27,13 +27,13 @@ const UNIT_MODEL: ContactModel = ContactModel::Sigmoid {
 /// Largest error of one sub-flow.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SubFlowError {
-    /// which, and in which regime
+    /// sub-flow and regime
     pub name: String,
-    /// compared
+    /// cases compared
     pub cases: usize,
-    /// largest error over the scale: of a position the travel and h_min, of a normal 1
+    /// largest error over the scale: for a position the travel and h_min, for a normal 1
     pub largest_error: f64,
-    /// where that was
+    /// case of that error
     pub worst: String,
 }
 
@@ -63,7 +63,7 @@ const REGIMES: [(&str, ForceShare); 7] = [
     }),
 ];
 
-/// All of them, `cases` of each.
+/// All sub-flows, `cases` of each.
 pub(super) fn sub_flows(rng: &mut Pcg64, cases: usize) -> Vec<SubFlowError> {
     let mut errors: Vec<_> = REGIMES
         .iter()
@@ -74,8 +74,7 @@ pub(super) fn sub_flows(rng: &mut Pcg64, cases: usize) -> Vec<SubFlowError> {
     errors
 }
 
-/// The worst of `cases`: the error of each, and where it was; `None` where there is nothing to
-/// compare with.
+/// The worst of `cases`: each gives its error and its description; `None` without a reference.
 fn worst_of(
     name: &str,
     cases: usize,
@@ -89,7 +88,7 @@ fn worst_of(
     };
     for (error, at) in (0..cases).filter_map(&mut case) {
         worst.cases += 1;
-        // a NaN is the worst there is
+        // NaN counts as the worst error
         if error.is_nan() || error > worst.largest_error {
             worst.largest_error = if error.is_nan() { f64::INFINITY } else { error };
             worst.worst = at;
@@ -140,7 +139,7 @@ fn travel(model: ContactModel, h: f64, force: f64, t: f64) -> f64 {
 
 fn of_sigmoid(rng: &mut Pcg64, name: &str, share: ForceShare, cases: usize) -> SubFlowError {
     worst_of(name, cases, |case| {
-        // half of them where the logistic bends, half of them anywhere an exponential is finite
+        // half of them at the bend of the logistic, half anywhere with a finite exponential
         let u = if case % 2 == 0 {
             rng.random_range(-12.0..12.0)
         } else {
@@ -157,15 +156,15 @@ fn of_sigmoid(rng: &mut Pcg64, name: &str, share: ForceShare, cases: usize) -> S
 }
 
 /// −Δu of du/dT = 1/(1+eᵘ) − c after T: the root of ∫ du / (1/(1+eᵘ) − c) = T between the start and
-/// the farthest it can be. `None` where it ends beyond the largest exponential without having been
-/// beyond the bend from the start.
+/// the farthest possible value. `None` if it ends beyond the largest exponential without a start
+/// beyond the bend.
 fn exact_travel(u: f64, c: f64, t: f64) -> Option<f64> {
     let rate = share(u.into()) - c.into();
     if rate.high == 0.0 {
         return Some(0.0);
     }
-    // u moves monotonically, towards the rest point where there is one, and no faster than the
-    // larger of the rates at both ends
+    // u moves monotonically, towards the rest point if there is one, and no faster than the larger
+    // of the rates at both ends
     let up = rate.high > 0.0;
     let fastest = if up { (1.0 - c).abs() } else { c.abs() }.max(rate.high.abs());
     let farthest = u + if up { fastest * t } else { -fastest * t };
@@ -185,7 +184,7 @@ fn exact_travel(u: f64, c: f64, t: f64) -> Option<f64> {
     let (mut near, mut far) = (Double2::from(u), Double2::from(within));
     for _ in 0..BISECTIONS {
         let middle = (near + far) * 0.5.into();
-        // beyond the rest point there is no time at all
+        // the time is undefined beyond the rest point
         let is_before = primitive(middle, c)
             .filter(|_| ((share(middle) - c.into()).high > 0.0) == up)
             .is_some_and(|there| (there - start - t.into()).high < 0.0);
@@ -198,8 +197,8 @@ fn exact_travel(u: f64, c: f64, t: f64) -> Option<f64> {
     Some((Double2::from(u) - near).value())
 }
 
-/// Where u runs so far that the exponential has no say: the rate is −c or 1 − c throughout but for
-/// the tail of the bend.
+/// Travel for u so large that the exponential has no effect: the rate is −c or 1 − c throughout
+/// except in the tail of the bend.
 fn straight(u: f64, c: f64, t: f64, far: f64) -> Option<f64> {
     let is_flat = |low: f64, high: f64| low > 60.0 || high < -60.0;
     let (low, high) = (u.min(far), u.max(far));
@@ -277,7 +276,7 @@ fn exact_normal(force: &Vector3<f64>, exponent: f64) -> Vector3<f64> {
     let (x, z) = (Double2::from(force.x), Double2::from(force.z));
     let one = Double2::from(1.0);
     let length = ((x * x + z * z).ln() * 0.5.into()).exp();
-    // tan(θ/2) = sin / (1 + cos) or (1 − cos) / sin, whichever does not cancel
+    // tan(θ/2) = sin / (1 + cos) or (1 − cos) / sin, the form without cancellation
     let tangent = if force.z > 0.0 {
         x / (length + z)
     } else {

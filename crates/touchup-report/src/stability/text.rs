@@ -9,7 +9,7 @@ use itertools::Itertools;
 use touchup_core::haptic::GuardParams;
 use touchup_core::haptic::dynamics::RELATIVE_ERROR;
 
-/// What of the runs the maps show.
+/// Quantity in the maps.
 const SHARE_OF: &str = "stable runs";
 impl Stability {
     /// The maps, the tables and their text.
@@ -30,7 +30,7 @@ impl Stability {
 }
 
 fn percent(share: f64) -> String {
-    // what is not all must not read as all
+    // a share below 1 must not read as 100 %
     if share == 1.0 {
         "100 %".to_owned()
     } else {
@@ -215,7 +215,7 @@ fn quality_map(meshes: &[MeshShares]) -> Figure {
         )
 }
 
-/// How many runs there were, and how many percent of them ended in each way.
+/// Number of runs, and percentage of each ending.
 fn with_endings<R: Copy>(table: TableOf<R>, of: fn(R) -> EndingCounts) -> TableOf<R> {
     RunEnding::ALL.into_iter().fold(
         table.column("runs", |row| of(row).runs()),

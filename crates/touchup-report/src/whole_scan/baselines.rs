@@ -1,7 +1,7 @@
-//! Baselines: what the paper names as alternatives.
+//! Baselines: alternatives named by the paper.
 //!
-//! Contact points alone: the mesh is moved so that it passes through the point where the ball
-//! touches; no force, no measured normal, no guard on what an update may do.
+//! Contact points alone: the mesh moves so that it passes through the ball's contact point; no
+//! force, no measured normal, no guard on updates.
 //!
 //! An exact Gaussian-process implicit surface, refitted at each touch: f(x) = d(x) + g(x), where d
 //! is the signed distance from the scan and g a Gaussian process of mean 0 and covariance k(x, y) =
@@ -15,23 +15,23 @@ use touchup_core::mesh::{
     FaceHit, FaceId, FaceTree, TriMesh, VertexId, pseudo_normal, signed_distance,
 };
 
-/// Rounds in which a vertex is moved to the zero of f along its normal.
+/// Rounds that move a vertex to the zero of f along its normal.
 const ROUNDS: usize = 4;
-/// Vertices beyond this many ℓ from every touch stay: there k is below 1e-4 of its height.
+/// Vertices beyond this multiple of ℓ from every touch stay: there k is below 1e-4 of its height.
 const FAR: f64 = 4.5;
 
-/// A mesh that is pulled through contact points.
+/// A mesh pulled through contact points.
 ///
-/// Which point of the ball touches is not known without a force: the one under the normal of the
-/// unrefined scan is taken, in the place that is closest to the centre. The corners of the face
-/// closest to that point make the least moves along that normal that bring it as far, wᵢ / Σ w² of
+/// The contact point of the ball is unknown without a force: the model takes the one under the
+/// normal of the unrefined scan, at the place closest to the centre. The corners of the face
+/// closest to that point make the least moves along that normal that bring it there, wᵢ / Σ w² of
 /// the displacement by its barycentric coordinates w; the vertices around it make (1 − (d/R)²)² of
-/// the displacement, d their distance from the place that is moved.
+/// the displacement, d their distance from the moved place.
 #[derive(Clone, Debug)]
 pub struct ContactSculptor<'a> {
     scan: &'a TriMesh,
     scan_tree: FaceTree,
-    /// as it is now
+    /// current mesh
     pub mesh: TriMesh,
     tree: FaceTree,
     radius: f64,
@@ -58,8 +58,8 @@ impl<'a> ContactSculptor<'a> {
         }
     }
 
-    /// Takes the centre (m, in O) of a ball in contact; returns the point of contact through which
-    /// the mesh passes now, or `None` where the scan has no normal.
+    /// Takes the centre (m, in O) of a ball in contact; returns the contact point, now on the mesh,
+    /// or `None` if the scan has no normal there.
     pub fn push(&mut self, centre: &Point3<f64>) -> Option<Point3<f64>> {
         let scanned = self.scan_tree.closest(self.scan, centre, f64::INFINITY)?;
         let normal = pseudo_normal(self.scan, &scanned);
@@ -69,7 +69,7 @@ impl<'a> ContactSculptor<'a> {
         let contact = centre - self.radius * normal;
         let hit = self.tree.closest(&self.mesh, &contact, f64::INFINITY)?;
         self.gather(&hit);
-        // sideways nothing moves, or a sliding ball drives the mesh before it
+        // no sideways motion, or a sliding ball drives the mesh before it
         let step = normal * normal.dot(&(contact - hit.point));
         for &(vertex, share) in &self.moving {
             self.mesh
@@ -85,8 +85,7 @@ impl<'a> ContactSculptor<'a> {
         Some(contact)
     }
 
-    /// Finds the corners of the handle, and from there on the vertices within reach, as far as they
-    /// hang together.
+    /// Finds the corners of the handle, and the vertices within reach that are connected to them.
     fn gather(&mut self, hit: &FaceHit) {
         let squares: f64 = hit.barycentric.iter().map(|weight| weight * weight).sum();
         let corners = self.mesh.corners(hit.face).into_iter().zip(hit.barycentric);
@@ -112,12 +111,12 @@ impl<'a> ContactSculptor<'a> {
     }
 }
 
-/// What a Gaussian process assumes.
+/// Assumptions of a Gaussian process.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GaussianParams {
     /// s: root mean square of the values
     pub amplitude: f64,
-    /// ℓ: distance over which values are alike, m
+    /// ℓ: correlation length, m
     pub length: f64,
     /// σ: standard deviation of a measured value
     pub noise: f64,
@@ -129,7 +128,7 @@ impl GaussianParams {
     }
 }
 
-/// A Gaussian process that was fitted to values at points.
+/// A Gaussian process fitted to values at points.
 #[derive(Clone, Debug)]
 pub struct GaussianProcess {
     params: GaussianParams,
@@ -138,10 +137,10 @@ pub struct GaussianProcess {
 }
 
 impl GaussianProcess {
-    /// Fits exactly; `None` where K + σ² I is not positive definite to rounding: two points in one
+    /// Fits exactly; `None` if K + σ² I is not positive definite to rounding: two points in one
     /// place without noise.
     ///
-    /// - `points`: m; `values`: as many, in any unit.
+    /// - `points`: m; `values`: one per point, in any unit.
     pub fn fit(params: GaussianParams, points: &[Point3<f64>], values: &[f64]) -> Option<Self> {
         let count = points.len().min(values.len());
         let noise = params.noise.powi(2);
@@ -186,7 +185,7 @@ pub struct GaussianSurface<'a> {
 }
 
 impl<'a> GaussianSurface<'a> {
-    /// A surface that is the scan.
+    /// A surface equal to the scan.
     pub fn new(scan: &'a TriMesh, params: GaussianParams) -> Self {
         Self {
             scan,
@@ -198,8 +197,8 @@ impl<'a> GaussianSurface<'a> {
         }
     }
 
-    /// Takes a contact point (m, in O) and refits; whether that was possible. A touch that makes it
-    /// impossible is forgotten.
+    /// Takes a contact point (m, in O) and refits; returns success. Forgets a touch that makes the
+    /// fit fail.
     pub fn push(&mut self, contact: Point3<f64>) -> bool {
         let Some(distance) = signed_distance(self.scan, &self.tree, &contact, f64::INFINITY) else {
             return false;
@@ -217,7 +216,7 @@ impl<'a> GaussianSurface<'a> {
         is_possible
     }
 
-    /// The scan with its vertices moved along their normals to where f is zero.
+    /// The scan with its vertices moved along their normals to the zero of f.
     pub fn mesh(&self) -> TriMesh {
         let mut mesh = self.scan.clone();
         let Some(process) = &self.process else {
@@ -240,7 +239,7 @@ impl<'a> GaussianSurface<'a> {
             else {
                 continue;
             };
-            // along the normal d is the displacement, so f is zero where that is −g
+            // along the normal d is the displacement, so f vanishes at a displacement of −g
             let gone = (0..ROUNDS).fold(0.0, |gone, _| -process.mean(&(position + gone * normal)));
             mesh.set_position(vertex, position + gone * normal);
         }

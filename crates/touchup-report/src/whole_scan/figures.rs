@@ -5,10 +5,10 @@ use crate::{Axis, Figure, LineStroke, Mark, Series, Spread, Table};
 use itertools::Itertools;
 use touchup_page::number::range;
 
-/// Points of a drawn law.
+/// Points of a law's curve.
 const STEPS: usize = 12;
 
-/// What an axis shows of a method: its label, its column and the value, all on a logarithmic scale.
+/// A method's quantity on an axis: its label, its column and the value, all on a logarithmic scale.
 type Quantity = (
     &'static str,
     &'static str,
@@ -29,7 +29,7 @@ const NORMAL: Quantity = ("mean normal error, deg", "normal_error_deg", |_, erro
     error.normal_mean_deg.into()
 });
 
-/// Figures with a mark for each method: id, title, what is to the right and what is upward.
+/// Figures with a mark for each method: id, title, horizontal and vertical quantity.
 const BY_METHOD: [(&str, &str, [Quantity; 2]); 3] = [
     (
         "error_total",
@@ -68,7 +68,7 @@ impl WholeScan {
             .collect()
     }
 
-    /// How the times were come by.
+    /// Source of the times.
     fn repeats(&self) -> String {
         format!(
             "Median of {} runs in turns, bars from p10 to p90; what takes longer than {} s was run once.",
@@ -163,7 +163,7 @@ impl WholeScan {
             .caption("The same samples on scans with shorter and longer edges. The errors are the same in every run.")
     }
 
-    /// What a touch costs the Gaussian process, and the haptic update beside it.
+    /// Cost of a touch for the Gaussian process, with the haptic update for comparison.
     fn gaussian_cost(&self, case: &CaseResult) -> Option<Figure> {
         let cost = case.gaussian.as_ref()?;
         let &(last, at_last) = cost.marks.last()?;
@@ -213,7 +213,7 @@ impl WholeScan {
             results.map(move |result| (case, scan, result))
         });
         type Row<'a> = (&'a CaseResult, &'a ScanResult, Option<&'a MethodResult>);
-        // without a method: the scan as it came
+        // without a method: the original scan
         let error =
             |(_, scan, result): Row| result.map_or(Some(scan.before), |result| result.error);
         Table::of("whole_scan", "All methods on all scans", rows)

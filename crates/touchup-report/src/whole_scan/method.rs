@@ -1,4 +1,4 @@
-//! The methods by which a scan is refined, and how long each takes.
+//! Methods of refining a scan, and their run times.
 
 use std::fmt::Display;
 use std::time::Instant;
@@ -12,10 +12,9 @@ use touchup_core::mesh::{FaceTree, TriMesh};
 use touchup_core::reconstruct::PatcherParams;
 use touchup_session::live::{Engine, Renewal};
 
-/// Standard deviation of a contact point for the Gaussian process, m: that of a good tracking
-/// system.
+/// Standard deviation of a contact point for the Gaussian process, m, as of a good tracking system.
 const CONTACT_NOISE: f64 = 0.05e-3;
-/// Why a baseline refuses a contact.
+/// Reason of a baseline's refusal.
 const NO_CONTACT: &str = "the place has no normal, or is another touch's";
 /// Number of samples between two checks of the time limit.
 const CLOCK_EVERY: usize = 64;
@@ -27,7 +26,7 @@ pub enum Reach {
     Handle,
     /// its neighbours
     OneRing,
-    /// vertices within so many radii of the ball
+    /// vertices within this multiple of the ball's radius
     TipRadii(f64),
 }
 
@@ -40,7 +39,7 @@ pub enum RefineMethod {
     PaperLie,
     /// the repaired rule: the haptic update alone
     Robust(Reach),
-    /// the repaired rule with the touched part remeshed, as `touchup refine` does it
+    /// the repaired rule with remeshing of the touched part, as in `touchup refine`
     Patch,
     /// contact points alone, a baseline
     ContactPoints,
@@ -49,10 +48,10 @@ pub enum RefineMethod {
 }
 
 impl RefineMethod {
-    /// The region that the robust mode has by default.
+    /// Default region of the robust mode.
     pub const HAPTIC: Self = Self::Robust(Reach::TipRadii(1.0));
 
-    /// All of them.
+    /// All methods.
     pub const ALL: [Self; 10] = [
         Self::PaperOde45,
         Self::PaperLie,
@@ -66,10 +65,10 @@ impl RefineMethod {
         Self::GaussianProcess,
     ];
 
-    /// Those that are tried on finer and coarser scans too.
+    /// Methods that also run on finer and coarser scans.
     pub const BY_DENSITY: [Self; 3] = [Self::HAPTIC, Self::Patch, Self::ContactPoints];
 
-    /// As the report calls it.
+    /// Name in the report.
     pub fn name(self) -> String {
         match self {
             Self::PaperOde45 => "paper, ode45".to_owned(),
@@ -84,43 +83,43 @@ impl RefineMethod {
     }
 }
 
-/// What a run may take.
+/// Limits of a run.
 pub(super) struct RunLimits {
-    /// a run that takes longer is stopped, s
+    /// longest duration before a stop, s
     pub longest_s: f64,
-    /// touches that the Gaussian process gets
+    /// touches for the Gaussian process
     pub touches: usize,
 }
 
 /// A run from the scan to the result.
 pub(super) struct Run {
     pub mesh: TriMesh,
-    /// before the first sample, s
+    /// time before the first sample, s
     pub build_s: f64,
     pub fed: Fed,
-    /// after the last sample, s
+    /// time after the last sample, s
     pub end_s: f64,
-    /// samples or touches that there are
+    /// available samples or touches
     pub offered: usize,
-    /// share of the updates that were cut back
+    /// share of updates cut back
     pub cut_back_share: f64,
 }
 
-/// What a method was given, one by one.
+/// Input to a method, one by one.
 #[derive(Default)]
 pub(super) struct Fed {
-    /// all of it, s
+    /// total time, s
     pub time_s: f64,
     /// samples or touches
     pub given: usize,
-    /// of them refused, and why the first
+    /// refusals, and the cause of the first
     pub refused: usize,
     pub why: Option<String>,
-    /// seconds between two looks at the clock
+    /// seconds between two clock checks
     pub laps: Vec<f64>,
 }
 
-/// Gives `items` to `take` until its time is over, which is seen after each `lap` of them.
+/// Gives `items` to `take` until its time is over; checks the clock after each `lap` of them.
 fn feed<T, E: Display>(
     items: impl Iterator<Item = T>,
     lap: usize,
@@ -187,7 +186,7 @@ fn params(method: RefineMethod, part: &GivenPart) -> RefineParams {
     params
 }
 
-/// The haptic update, with the patch where the method has one.
+/// The haptic update, with the patch if the method has one.
 fn refine(method: RefineMethod, part: &Part, scan: &TriMesh, limits: &RunLimits) -> Measured<Run> {
     let GivenPart {
         samples,

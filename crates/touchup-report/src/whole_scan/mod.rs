@@ -1,8 +1,8 @@
-//! Error against run time on whole scans: each method to refine a scan by touch, on the same scans
-//! and samples, with the alternatives that the paper names as baselines.
+//! Error against run time on whole scans: each method of refining a scan by touch, on the same
+//! scans and samples, with the paper's alternatives as baselines.
 //!
-//! The surface error is measured where the part was touched, in both directions; the worse of the
-//! two counts. Runs are made in turns, so that a machine that becomes slower does so for all.
+//! The surface error covers the touched part, in both directions; the worse of the two counts. Runs
+//! go in turns, so that a slowdown of the machine affects all of them.
 
 mod baselines;
 mod figures;
@@ -27,29 +27,29 @@ use touchup_core::mesh::TriMesh;
 /// One method on one scan.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MethodResult {
-    /// which
+    /// method
     pub method: RefineMethod,
-    /// as the report calls it
+    /// name in the report
     pub name: String,
-    /// against the part; `None` where the result has nothing near what was touched
+    /// error against the part; `None` if the result has nothing near the touches
     pub error: Option<TouchedError>,
     /// from the scan to the result, s
     pub total_s: Spread,
-    /// for each sample (or touch) that it was given, with the end's work shared out, µs
+    /// per sample (or touch) given, including a share of the final work, µs
     pub per_sample_us: Spread,
-    /// of that the work after the last sample, ms in all
+    /// final work after the last sample, ms in total
     pub end_ms: Spread,
-    /// how often it was run
+    /// number of runs
     pub runs: usize,
-    /// samples or touches that it was given
+    /// samples or touches given
     pub samples: usize,
-    /// share of the updates that were cut back to keep the mesh sound
+    /// share of updates cut back to keep the mesh sound
     pub cut_back_share: f64,
     /// the result is worse than the scan
     pub is_worse: bool,
-    /// it did not come to the end of the samples
+    /// whether it stopped before the last sample
     pub is_stopped: bool,
-    /// what went wrong, in words
+    /// failures, in words
     pub remarks: Vec<String>,
 }
 
@@ -58,39 +58,39 @@ pub struct MethodResult {
 pub struct ScanResult {
     /// mean edge length of the scan, mm
     pub edge_mm: f64,
-    /// its faces
+    /// faces of the scan
     pub faces: usize,
-    /// of the unrefined scan
+    /// error of the unrefined scan
     pub before: TouchedError,
-    /// in the order in which they were tried
+    /// in order of trial
     pub methods: Vec<MethodResult>,
 }
 
-/// What a touch costs the Gaussian process.
+/// Cost of a touch for the Gaussian process.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GaussianCost {
-    /// touches kept so far, and the time to take in one more, µs; the medians of groups
+    /// number of touches kept, and time to add one more, µs; the medians of groups
     pub marks: Vec<(f64, Spread)>,
-    /// of the power law through the larger half of them
+    /// exponent of the power law through the larger half of them
     pub exponent: f64,
-    /// contacts that there were
+    /// number of contacts
     pub contacts: usize,
-    /// by that law, the time to take in the last one if all were kept, µs
+    /// by that law, time to add the last contact if all were kept, µs
     pub at_all_contacts_us: f64,
 }
 
 /// One part with its scans.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CaseResult {
-    /// of the part
+    /// name of the part
     pub name: String,
-    /// samples that there are
+    /// number of samples
     pub samples: usize,
     /// time from the first to the last of them, s
     pub duration_s: f64,
-    /// the first is the one on which all methods were run
+    /// the first is the one for all methods
     pub scans: Vec<ScanResult>,
-    /// where it was tried
+    /// cost of the Gaussian process, if measured
     pub gaussian: Option<GaussianCost>,
 }
 
@@ -99,9 +99,9 @@ pub struct CaseResult {
 pub struct WholeScan {
     /// peaks, plate, and given parts
     pub cases: Vec<CaseResult>,
-    /// runs of each method that is not slow
+    /// runs of each method unless slow
     pub repeats: usize,
-    /// a run that takes longer than this is made only once, s
+    /// a run longer than this is not repeated, s
     pub slow_s: f64,
 }
 
@@ -109,7 +109,7 @@ pub struct WholeScan {
 const GROUP: usize = 25;
 
 impl MethodResult {
-    /// Whether it came to the end with a result that is no worse than the scan.
+    /// Whether it reached the end with a result no worse than the scan.
     pub fn is_sound(&self) -> bool {
         self.error.is_some() && !self.is_worse && !self.is_stopped
     }
@@ -165,20 +165,20 @@ impl ScanResult {
 }
 
 impl CaseResult {
-    /// The scan on which all methods were run.
+    /// The scan for all methods.
     pub fn main(&self) -> Option<&ScanResult> {
         self.scans.first()
     }
 }
 
-/// One method on one scan, with the runs so far.
+/// The runs of one method on one scan.
 struct Trial<'a> {
     part: &'a Part,
     scan: &'a TriMesh,
     method: RefineMethod,
-    /// of each run: s in all, µs per sample, and ms after the last one
+    /// for each run: total s, µs per sample, and ms after the last one
     times: Vec<[f64; 3]>,
-    /// what is equal in each run, and the times of touches in the first
+    /// results common to all runs, and the touch times of the first
     first: Option<(Run, Result<TouchedError, CompareError>)>,
 }
 
@@ -254,7 +254,7 @@ impl Trial<'_> {
 ///
 /// # Errors
 /// [`MeasureError`](crate::error::MeasureError), mostly of given parts: a method that fails on its
-/// own says so in its result.
+/// own reports that in its result.
 pub fn whole_scan(
     effort: Effort,
     given: Option<&GivenPart>,
@@ -285,7 +285,7 @@ pub fn whole_scan(
         }
     }
     for repeat in 0..repeats {
-        // what is slow runs once
+        // slow methods run once
         let is_due = |trial: &&mut Trial| {
             trial
                 .times

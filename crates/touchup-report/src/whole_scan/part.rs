@@ -1,4 +1,4 @@
-//! The parts that are touched: a known surface, a bad scan of it, and the contacts.
+//! Touched parts: a known surface, a bad scan of it, and the contacts.
 
 use nalgebra::{Point3, Vector3};
 
@@ -18,18 +18,18 @@ use touchup_sim::{
     add_vertex_noise, plan_demo, raster, scan, touch,
 };
 
-/// A scan, the true part, and the contacts on it, given by the caller; all in O.
+/// A caller's scan, true part, and contacts; all in O.
 #[derive(Clone, Debug)]
 pub struct GivenPart {
-    /// how the report calls it
+    /// name in the report
     pub name: String,
-    /// as it came
+    /// the unrefined scan
     pub scan: TriMesh,
     /// the true part
     pub truth: TriMesh,
     /// in order of time
     pub samples: Vec<Sample>,
-    /// what touched
+    /// tip of the probe
     pub tip: TipParams,
     /// weight, bias, frames of the samples
     pub compensator: CompensatorParams,
@@ -40,21 +40,21 @@ pub struct GivenPart {
 /// A measured contact.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FeltContact {
-    /// centre of a tip that does not bend, m: all that is known without a force
+    /// centre of a rigid tip, m: the only knowledge without a force
     pub reported: Point3<f64>,
     /// point of the ball under the force, m
     pub point: Point3<f64>,
 }
 
-/// A part with one scan of it or several, finer and coarser ones.
+/// A part with one or more scans of different density.
 pub(super) struct Part {
     pub given: GivenPart,
-    /// of the true part
+    /// tree of the true part
     tree: FaceTree,
-    /// of it
+    /// touched region of the true part
     region: TouchedRegion,
     pub contacts: Vec<FeltContact>,
-    /// scans beside the one that was given
+    /// scans beside the given one
     others: Vec<TriMesh>,
 }
 
@@ -67,13 +67,13 @@ const CHORD_ERROR: f64 = 10e-6;
 /// A contact is on the part when the ball's surface is within this distance of it, m.
 const ON_PART: f64 = 1e-3;
 
-/// Peaks and plate, and the part that was given.
+/// Peaks and plate, and the given part.
 pub(super) fn parts(
     effort: Effort,
     given: Option<&GivenPart>,
     progress: &mut dyn FnMut(&str),
 ) -> Measured<Vec<Part>> {
-    // what is given first: it may be refused
+    // the given part first: it may be refused
     let given = given
         .map(|given| Part::new(given.clone(), Vec::new()))
         .transpose()?;
@@ -86,7 +86,7 @@ pub(super) fn parts(
 
 /// A simulated part, touched by a hand-held stylus.
 ///
-/// - `scans`: the first is the one on which all methods are run.
+/// - `scans`: the first is the one for all methods.
 fn simulated(
     name: &str,
     (surface, truth): (&dyn Surface, TriMesh),
@@ -148,13 +148,12 @@ fn touched_peaks(effort: Effort) -> Measured<Part> {
     simulated("peaks", (&peaks, peaks.mesh(TRUE_EDGE)?), &path, scans)
 }
 
-/// The plate of the demo, scanned and touched as there; a quick one in one raster over its
-/// features.
+/// The demo's plate with its scan and touches; a quick one in one raster over its features.
 fn touched_plate(effort: Effort) -> Measured<Part> {
     let (plate, usual) = (Plate::default(), ScannerParams::default());
     let mut path = plan_demo(&plate, &PathParams::default())?;
     if effort.is_quick {
-        // the first raster: there, over it, and away
+        // the first raster: approach, raster, retreat
         path.truncate(3);
     }
     let edges = [usual.edge, 4.8e-3, 1.2e-3];
@@ -176,7 +175,7 @@ fn touched_plate(effort: Effort) -> Measured<Part> {
 }
 
 impl Part {
-    /// - `others`: scans beside the one that was given.
+    /// - `others`: scans beside the given one.
     fn new(given: GivenPart, others: Vec<TriMesh>) -> Measured<Self> {
         let GivenPart {
             truth,
@@ -228,12 +227,12 @@ impl Part {
         })
     }
 
-    /// The first is the one on which all methods are run.
+    /// The scans; the first is the one for all methods.
     pub fn scans(&self) -> impl Iterator<Item = &TriMesh> {
         std::iter::once(&self.given.scan).chain(&self.others)
     }
 
-    /// Of a mesh against the true part, where that was touched.
+    /// Error of a mesh against the touched region of the true part.
     pub fn error_of(&self, mesh: &TriMesh) -> Result<TouchedError, CompareError> {
         TouchedError::of(mesh, &self.given.truth, &self.tree, &self.region)
     }

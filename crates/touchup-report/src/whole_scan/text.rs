@@ -1,15 +1,15 @@
-//! What whole scans say, in words.
+//! Results of whole scans, in words.
 
 use super::figures::by_edge;
 use super::{CaseResult, GaussianCost, MethodResult, Reach, RefineMethod, ScanResult, WholeScan};
 use crate::Chapter;
 use itertools::Itertools;
 
-/// A difference below this share is none.
+/// Differences below this share do not count.
 const ALIKE: f64 = 0.02;
 
 impl WholeScan {
-    /// As a part of the report.
+    /// Chapter of the report.
     pub fn chapter(&self) -> Chapter {
         let mut text = vec![
             "Each method gets the same scan and the same samples, one thread. The surface error is measured where the part was \
@@ -88,7 +88,7 @@ impl CaseResult {
         text
     }
 
-    /// What finer and coarser scans change.
+    /// Effect of finer and coarser scans.
     fn densities(&self) -> Option<String> {
         let text = |method: RefineMethod| {
             let each = |scan: &ScanResult| {
@@ -141,7 +141,7 @@ fn long_time(seconds: f64) -> String {
     }
 }
 
-/// Whether force and normals are worth it.
+/// Benefit of force and normals.
 fn against_contact_points(haptic: &MethodResult, points: Option<&MethodResult>) -> String {
     let Some(points) = points else {
         return String::new();
@@ -171,7 +171,7 @@ fn against_contact_points(haptic: &MethodResult, points: Option<&MethodResult>) 
     )
 }
 
-/// Regions so small that they have nothing but the handle.
+/// Regions so small that they contain only the handle.
 fn same_regions(scan: &ScanResult) -> String {
     let Some(handle) = scan.of(RefineMethod::Robust(Reach::Handle)) else {
         return String::new();

@@ -11,7 +11,7 @@ use touchup_core::numeric::quantile;
 const DENSITY: f64 = 4e6;
 /// Largest number of points: a mesh that blew up has a huge area.
 const MOST_POINTS: f64 = 200e3;
-/// Of the points on the mesh.
+/// Seed of the points on the mesh.
 const SEED: u64 = 1;
 
 /// Distances and angles between mesh and part in the touched region.
@@ -21,7 +21,7 @@ pub struct TouchedError {
     pub part_to_mesh_mean_mm: f64,
     /// its 95th percentile, mm
     pub part_to_mesh_p95_mm: f64,
-    /// mean distance from the mesh to the part, where the closest place of the part was touched
+    /// mean distance from the mesh to the part, limited to touched closest places of the part
     /// (accuracy), mm
     pub mesh_to_part_mean_mm: f64,
     /// its 95th percentile, mm
@@ -34,11 +34,11 @@ pub struct TouchedError {
 }
 
 impl TouchedError {
-    /// Of `mesh` against `truth` with its tree, where it was touched.
+    /// Errors of `mesh` against the touched part of `truth` with its tree.
     ///
     /// # Errors
-    /// [`CompareError::NoPoints`] where no part of the mesh is near what was touched, or nothing
-    /// was touched; [`CompareError::NoFaces`]; [`CompareError::NotFinite`].
+    /// [`CompareError::NoPoints`] if no part of the mesh is near the touches, or without touches;
+    /// [`CompareError::NoFaces`]; [`CompareError::NotFinite`].
     pub fn of(
         mesh: &TriMesh,
         truth: &TriMesh,

@@ -1,4 +1,4 @@
-//! The integrators that are compared, each with the settings it is swept over.
+//! Integrators of the comparison, each with its swept settings.
 
 use std::cell::Cell;
 
@@ -11,7 +11,7 @@ use touchup_core::haptic::dynamics::dormand_prince;
 use touchup_core::haptic::{FaceDynamics, FaceState, StepRule};
 use touchup_core::names;
 
-/// A Jacobian has four columns: what it would cost by differences.
+/// A Jacobian has four columns: its cost by differences.
 const JACOBIAN_COUNTS: u64 = 4;
 /// The flow, and twice the flow with drift.
 const FLOWS_CORRECTED: u64 = 3;
@@ -30,12 +30,12 @@ names! {
         Rodas = "RODAS 4(3), implicit",
         /// touchup's exact position flow, then its exact rotation
         Lie = "Lie, exact flows",
-        /// the same with the drift that the rotation causes
+        /// the exact flows with the drift caused by the rotation
         DriftCorrected = "drift-corrected",
     }
 }
 
-/// The setting that controls its accuracy.
+/// Setting that controls the accuracy.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SolverSetting {
     /// equal steps over the sample
@@ -49,17 +49,17 @@ pub enum SolverSetting {
 pub struct Solved {
     /// at the end of the sample
     pub face: FaceState,
-    /// of the right-hand side; a Jacobian counts as four, a flow that is solved exactly as one
+    /// evaluations of the right-hand side; a Jacobian counts as four, an exact flow as one
     pub evaluations: u64,
 }
 
 impl Method {
-    /// Whether it is one of touchup's own.
+    /// Whether it is touchup's own.
     pub fn is_exact(self) -> bool {
         matches!(self, Self::Lie | Self::DriftCorrected)
     }
 
-    /// From coarse to fine.
+    /// Settings from coarse to fine.
     pub fn settings(self, effort: Effort) -> Vec<SolverSetting> {
         let doublings = |most: u32| (0..=most).map(|k| SolverSetting::Steps(1 << k)).collect();
         let tolerances = || {
@@ -75,7 +75,7 @@ impl Method {
         }
     }
 
-    /// The face at the end of the sample; `None`: it gave up, or what it found is not finite.
+    /// The face at the end of the sample; `None` if it gave up, or for a non-finite result.
     pub fn solve(self, problem: &Problem, setting: SolverSetting) -> Option<Solved> {
         let (start, end, scale) = (problem.start(), problem.dt_s, problem.scale());
         let count = Cell::new(0u64);

@@ -17,23 +17,23 @@ use touchup_page::number::three_digits;
 
 /// The paper's h_min, m.
 pub const PAPER_H_MIN_M: f64 = 0.5e-3;
-/// From the mildest to the stiffest, m.
+/// h_min from the mildest to the stiffest, m.
 const H_MINS_M: [f64; 8] = [1e-3, PAPER_H_MIN_M, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9];
 const H_MINS_QUICK_M: [f64; 4] = [1e-3, PAPER_H_MIN_M, 1e-6, 1e-9];
-/// Without friction, and as real force streams lean: 4 to 28° were seen.
+/// Tilts without friction, and as in real force streams: 4 to 28° occur.
 const TILTS_DEG: [f64; 2] = [0.0, 20.0];
 /// Accuracy of the reference: to this share of h_min, or to a few roundings of the travel.
 const REFERENCE_SHARE: f64 = 1e-12;
 const REFERENCE_ROUNDINGS: f64 = 4.0;
 
-/// Everything that was measured.
+/// All work-precision measurements.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WorkPrecision {
     /// one for each stiffness and tilt
     pub cases: Vec<FaceCase>,
-    /// of each time
+    /// repeats of each timing
     pub repeats: usize,
-    /// where no reference was found
+    /// cases without a reference
     pub without_reference: Vec<String>,
 }
 
@@ -42,11 +42,11 @@ pub struct WorkPrecision {
 pub struct FaceCase {
     /// m
     pub h_min_m: f64,
-    /// between force and normal, degrees
+    /// angle between force and normal, degrees
     pub tilt_deg: f64,
     /// exact displacement of the face, m
     pub travel_m: f64,
-    /// errors below it are shown as it: the reference knows no better, m
+    /// resolution of the reference, m: smaller errors show as this value
     pub floor_m: f64,
     /// one for each of [`Method::ALL`]
     pub curves: Vec<Curve>,
@@ -55,9 +55,9 @@ pub struct FaceCase {
 /// One integrator over its settings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Curve {
-    /// which
+    /// integrator
     pub method: Method,
-    /// from coarse to fine, without those at which it gave up
+    /// from coarse to fine, without failed settings
     pub points: Vec<IntegratorRun>,
     /// number of settings at which it gave up
     pub gave_up: usize,
@@ -68,7 +68,7 @@ pub struct Curve {
 pub struct IntegratorRun {
     /// steps, or tolerance
     pub setting: SolverSetting,
-    /// of the barycentre at the end, m
+    /// error of the barycentre at the end, m
     pub error_m: f64,
     /// |n − n_ref| at the end: the angle, rad, and the error of the length
     pub normal_error: f64,
@@ -79,7 +79,7 @@ pub struct IntegratorRun {
 }
 
 impl WorkPrecision {
-    /// Measures all of it.
+    /// Measures all cases.
     pub fn measure(effort: Effort, progress: &mut dyn FnMut(&str)) -> Self {
         let repeats = effort.choose(9, 31);
         let h_mins = effort.choose(&H_MINS_QUICK_M[..], &H_MINS_M[..]);
@@ -106,7 +106,7 @@ impl WorkPrecision {
     }
 }
 
-/// `None` where there is nothing to compare with.
+/// One case; `None` without a reference.
 fn case(h_min_m: f64, tilt_deg: f64, effort: Effort, repeats: usize) -> Option<FaceCase> {
     let problem = Problem::of(h_min_m, tilt_deg.to_radians());
     let right = problem.held().reference()?.face;
@@ -148,7 +148,7 @@ fn case(h_min_m: f64, tilt_deg: f64, effort: Effort, repeats: usize) -> Option<F
     })
 }
 
-/// Seconds for one call: so many readings, each of which spans so many seconds, or one call.
+/// Seconds per call: this number of readings, each over this duration, or one call.
 fn time<T>((repeats, batch_s): (usize, f64), mut solve: impl FnMut() -> T) -> Spread {
     let mut seconds = |calls: usize| timed(|| (0..calls).for_each(|_| drop(black_box(solve())))).0;
     seconds(1);
@@ -182,7 +182,7 @@ impl FaceCase {
 }
 
 impl Curve {
-    /// The fastest point that reaches `error_m` with every finer one: a hit by luck does not count.
+    /// The fastest point that reaches `error_m` with every finer one: a lucky hit does not count.
     pub fn cheapest(&self, error_m: f64) -> Option<IntegratorRun> {
         let reaching = self
             .points
@@ -194,7 +194,7 @@ impl Curve {
             .copied()
     }
 
-    /// With the whole sample in a single step.
+    /// The run with the whole sample in a single step.
     pub fn one_step(&self) -> Option<&IntegratorRun> {
         self.points
             .iter()

@@ -1,4 +1,4 @@
-//! One face held against one sample, as every integrator gets it: four unknowns, the travel along
+//! One face held against one sample, as posed to every integrator: four unknowns, the travel along
 //! n*(0) and the normal.
 //!
 //! ```text
@@ -33,7 +33,7 @@ pub struct Problem {
     pub force: Vector3<f64>,
     /// n* at the start, in O
     pub normal: Vector3<f64>,
-    /// how long the sample holds, s
+    /// hold time of the sample, s
     pub dt_s: f64,
 }
 
@@ -50,17 +50,17 @@ impl Problem {
         }
     }
 
-    /// s = 0 and n*(0).
+    /// Initial state, s = 0 and n*(0).
     pub fn start(&self) -> State {
         [0.0, self.normal.x, self.normal.y, self.normal.z]
     }
 
-    /// The size of each unknown that counts.
+    /// Characteristic size of each unknown.
     pub fn scale(&self) -> State {
         [self.h_min_m, 1.0, 1.0, 1.0]
     }
 
-    /// The same for [`touchup_core::haptic::FaceDynamics`], with the paper's direction of motion.
+    /// Parameters of [`touchup_core::haptic::FaceDynamics`], with the paper's direction of motion.
     pub fn params(&self, rule: StepRule) -> DynamicsParams {
         DynamicsParams {
             model: ContactModel::Sigmoid {
@@ -76,7 +76,7 @@ impl Problem {
         }
     }
 
-    /// The same for the reference.
+    /// The problem for the reference.
     pub fn held(&self) -> HeldFace {
         let Self {
             arm,
@@ -117,8 +117,8 @@ impl Problem {
         )
     }
 
-    /// dy/dt as the paper prints it: n is taken as it comes, also where an integrator has let it
-    /// drift from length 1.
+    /// dy/dt as the paper prints it: n is used as is, even if an integrator has let it drift from
+    /// length 1.
     pub fn rate(&self, y: &State) -> State {
         let n = Vector3::new(y[1], y[2], y[3]);
         let f = self.expected((self.arm - y[0] * self.normal).dot(&n)).0;
@@ -138,7 +138,7 @@ impl Problem {
         let arm = self.arm - y[0] * self.normal;
         let (f, slope) = self.expected(arm.dot(&n));
         let (pressing, squared) = (self.force.dot(&n), n.norm_squared());
-        // h by each unknown
+        // derivative of h by each unknown
         let h_by = Vector4::new(-self.normal.dot(&n), arm.x, arm.y, arm.z);
         let towards = squared * self.force - pressing * n;
         let (of_travel, turning) = (-ALPHA_M_PER_N_S * squared, BETA_PER_N2_S * towards);

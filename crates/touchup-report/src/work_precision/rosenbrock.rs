@@ -6,7 +6,7 @@ use nalgebra::{Matrix4, Vector4};
 
 use super::problem::State;
 
-/// Coefficients for the form without products of matrix and stage: those of the arguments, of the
+/// Coefficients for the form without products of matrix and stage: for the arguments, for the
 /// right-hand sides, and γ.
 const A: [[f64; 5]; 6] = [
     [0.0; 5],
@@ -73,7 +73,7 @@ const C: [[f64; 5]; 6] = [
     ],
 ];
 const GAMMA: f64 = 0.25;
-/// Steps, accepted or not, after which it gives up.
+/// Most steps, accepted or not.
 const MAX_STEPS: usize = 20_000;
 /// A step may shrink to a fifth and grow sixfold; aim below the tolerance.
 const CHANGE: (f64, f64) = (0.2, 6.0);
@@ -118,7 +118,7 @@ pub fn integrate(
     None
 }
 
-/// The result of order 4, and its difference from that of order 3.
+/// The result of order 4, and its difference from order 3.
 fn stages(
     y: &Vector4<f64>,
     dt: f64,

@@ -5,11 +5,11 @@ use crate::{Axis, Chapter, Figure, Mark, Series, Spread, Table};
 use itertools::Itertools;
 use touchup_page::number::{range, three_digits};
 
-/// Requested accuracy, m: the resolution of a sensor, a thousandth of that, and as good as exact.
+/// Requested accuracy, m: the resolution of a sensor, a thousandth of that, and nearly exact.
 const LEVELS_M: [(f64, &str); 3] = [(1e-6, "1 µm"), (1e-9, "1 nm"), (1e-12, "1 pm")];
 /// Stiffnesses with figures of their own.
 const SHOWN_H_MINS_M: [f64; 2] = [PAPER_H_MIN_M, 1e-9];
-/// Methods that may do a whole sample in one step.
+/// Methods that can do a whole sample in one step.
 const EXACT: [Method; 2] = [Method::Lie, Method::DriftCorrected];
 
 impl WorkPrecision {
@@ -28,7 +28,7 @@ impl WorkPrecision {
         )
     }
 
-    /// What a practitioner should take from it.
+    /// Conclusion for a practitioner.
     pub fn verdict(&self) -> Vec<String> {
         let steps = EXACT
             .iter()
@@ -91,7 +91,7 @@ impl WorkPrecision {
         ))
     }
 
-    /// The fastest integrator for an error: where it is an exact step, and where not, by how much.
+    /// The fastest integrator for an error: wins of an exact step, and the factor of its losses.
     fn wins_and_losses(&self, (error_m, name): (f64, &str)) -> String {
         let outcomes = self
             .cases
@@ -143,7 +143,7 @@ impl WorkPrecision {
         )
     }
 
-    /// Up to which stiffness the explicit solvers are of use.
+    /// Largest stiffness at which the explicit solvers are of use.
     fn explicit_limits(&self) -> Option<String> {
         let fastest = |method: Method, error_m: f64| {
             let reaches = |case: &FaceCase| case.curve(method)?.cheapest(error_m).map(|_| ());
@@ -173,7 +173,7 @@ impl WorkPrecision {
         ))
     }
 
-    /// What a flow costs in evaluations.
+    /// Cost of a flow in evaluations.
     fn flow_cost(&self) -> Option<String> {
         let is_meant =
             |case: &&FaceCase| case.h_min_m == PAPER_H_MIN_M && case.tilt_deg == TILTS_DEG[1];
@@ -305,7 +305,7 @@ impl FastestSolvers {
         }
     }
 
-    /// How many times as long the other takes; `None` where one of them does not get there.
+    /// Time of the other solver over time of the exact step; `None` if one of them fails.
     fn factor(&self) -> Option<f64> {
         Some(self.other?.1.time_s.median / self.exact?.1.time_s.median)
     }
@@ -315,7 +315,7 @@ impl FastestSolvers {
     }
 }
 
-/// The text of a count, where it is not 0.
+/// The text of a count, unless it is 0.
 fn where_any(count: usize, text: impl Fn(usize) -> String) -> String {
     if count > 0 {
         text(count)
@@ -333,7 +333,7 @@ fn h_mins(outcomes: &[FastestSolvers]) -> String {
     }
 }
 
-/// In the unit that leaves few zeros.
+/// A length in the unit that leaves few zeros.
 fn length(metres: f64) -> String {
     let units = [(1e-3, "mm"), (1e-6, "µm"), (1e-9, "nm"), (1e-12, "pm")];
     let fitting = units.into_iter().find(|(unit, _)| metres >= 0.1 * unit);
@@ -375,7 +375,7 @@ impl FaceCase {
             .caption(format!("{caption}{}", self.gave_up()))
     }
 
-    /// Which integrators gave up, and how often; empty where none did.
+    /// Integrators that gave up, and counts; empty if none did.
     fn gave_up(&self) -> String {
         let giving_up = self.curves.iter().filter(|curve| curve.gave_up > 0);
         let failures = giving_up.map(|curve| {
