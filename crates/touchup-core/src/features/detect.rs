@@ -21,7 +21,7 @@ use crate::mesh::{FaceTree, TriMesh};
 use crate::numeric::distinct;
 use crate::stylus::ProbedPoint;
 
-/// What was found on a mesh.
+/// Features detected on a mesh.
 #[derive(Clone, Debug)]
 pub struct Detection {
     /// by kind, the largest first; numbered from 0 on
@@ -30,18 +30,17 @@ pub struct Detection {
     pub unexplained: f64,
 }
 
-/// A plane is worth telling when it is so many tolerances wide.
+/// Minimum width of a reported plane, in tolerances.
 const SURE_WIDTH: f64 = 25.0;
 
-/// A round wall is as wide as the ball within these shares: the mesh is coarse.
+/// Diameter of the ball's own path in the coarse mesh, in diameters of the ball.
 const OF_BALL: std::ops::Range<f64> = 0.97..1.12;
 
-/// Finds the features of a mesh, measured by touches where there are any. With touches the same
-/// surface has the same ones, however its vertices and faces are numbered: a live mesh and a saved
-/// one are numbered as they were made. A drawing keeps the order of its file.
+/// Detects the features of a mesh, measured by touches if there are any. With touches the same
+/// surface gives the same features for any numbering of vertices and faces: live and saved meshes
+/// number them in order of creation. A drawing keeps the order of its file.
 ///
-/// - `touches`: as [`crate::reconstruct::Patcher::probed`] has them; features name them by their
-///   place in it.
+/// - `touches`: as in [`crate::reconstruct::Patcher::probed`]; features refer to them by index.
 #[expect(clippy::too_many_lines)]
 pub fn detect(mesh: &TriMesh, touches: &[ProbedPoint]) -> Detection {
     let numbered = (!touches.is_empty()).then(|| numbered_by_place(mesh));
@@ -50,7 +49,7 @@ pub fn detect(mesh: &TriMesh, touches: &[ProbedPoint]) -> Detection {
     let mut parted = Parted::of(mesh, &tree);
     join_planes(&mut parted);
     let is_round = add_contact_walls(&mut parted, touches);
-    // contacts took faces from planes of the mesh that are the same ones
+    // contact walls took faces from planes of the mesh; equal planes join again
     join_planes(&mut parted);
     let mut walls = Wall::all(&parted.facets, &parted.segmentation);
     add_cones(&mut parted, &mut walls);
@@ -61,7 +60,7 @@ pub fn detect(mesh: &TriMesh, touches: &[ProbedPoint]) -> Detection {
         contact_slots(&parted, touches, &is_round),
         slots(&parted, &walls, &of_face, &borders),
     );
-    // what was felt all around is no end of a slot
+    // a bore with contacts all around is no end of a slot
     let felt_bores: Vec<&Wall> = holes
         .iter()
         .map(|hole| &walls[hole.wall])
@@ -88,8 +87,7 @@ pub fn detect(mesh: &TriMesh, touches: &[ProbedPoint]) -> Detection {
     let observed = Observed::of(&parted, &of_face, touches);
     let measure = Measure::new(&observed);
 
-    // a wall of the ball's own width that nothing touched is the way that it took through what was
-    // not scanned
+    // an untouched wall of the ball's own width is the path of the ball through an unscanned region
     let of_ball = touches
         .iter()
         .map(|touch| 2.0 * touch.radius)
@@ -139,7 +137,7 @@ pub fn detect(mesh: &TriMesh, touches: &[ProbedPoint]) -> Detection {
     features.extend(cut);
     let mut features = with_heads(&measure, without_second_walls(features));
     let is_reported = |slot: &Slot, feature: &Feature| {
-        // of a measured mesh what is open all around may be a gap between its pieces
+        // in a measured mesh a void open all around may be a gap between pieces
         let is_shut = slot.floor.is_some() || slot.is_closed;
         is_shut || parted.rounding.is_some() || feature.fitted_to == FittedTo::Touches
     };
@@ -195,7 +193,7 @@ pub fn detect(mesh: &TriMesh, touches: &[ProbedPoint]) -> Detection {
     }
 }
 
-/// Joins planes that meet and are one.
+/// Joins adjacent segments of one plane.
 fn join_planes(parted: &mut Parted) {
     let beside: Vec<_> = borders(parted, &without_seams(parted))
         .into_keys()
@@ -205,7 +203,7 @@ fn join_planes(parted: &mut Parted) {
         .join_planes(&parted.facets, beside.into_iter());
 }
 
-/// Holes, and the heads around them that contacts alone show; both are steps of one.
+/// Adds the heads of holes that contacts alone show; hole and head form one group.
 fn with_heads(measure: &Measure, mut features: Vec<Feature>) -> Vec<Feature> {
     for at in 0..features.len() {
         let Some(head) = head_of(measure, &features[at]) else {
@@ -225,7 +223,7 @@ fn with_heads(measure: &Measure, mut features: Vec<Feature>) -> Vec<Feature> {
     features
 }
 
-/// Whether a hole is a head that was found already.
+/// Whether a known feature is the same hole as a head.
 fn is_same_head(known: &Feature, head: &Feature) -> bool {
     let wide = |feature: &Feature| {
         feature
@@ -261,14 +259,13 @@ fn head_feature(measure: &Measure, head: &Head) -> Feature {
     }
 }
 
-/// Holes, or bosses, are one wall when their axes are within 11°, no farther apart than this share
-/// of the diameter where they overlap, and as wide within that share.
+/// Two holes, or bosses, have one wall if their axes agree within 11° and, at their overlap, within
+/// this share of the diameter, and their diameters within the same share.
 const ONE_AXIS: f64 = 0.98;
 const ONE_WALL: f64 = 0.15;
 
-/// Without those of holes, or of bosses, that are another one again: seen from its other end, or in
-/// what the mesh has of a wall beside what was felt of it. Of two that with the most touches is
-/// kept, and the deeper one where both have none.
+/// Removes duplicates of holes, or of bosses: one hole from its other end, or mesh of a wall beside
+/// its touched part. The duplicate with the most touches stays, without touches the deeper one.
 fn without_second_walls(mut features: Vec<Feature>) -> Vec<Feature> {
     let depth = |feature: &Feature| feature.depth.as_ref().map_or(0.0, |depth| depth.value);
     let touches = |feature: &Feature| {
@@ -292,11 +289,11 @@ fn without_second_walls(mut features: Vec<Feature>) -> Vec<Feature> {
         .collect()
 }
 
-/// Whether two holes, or two bosses, overlap along one axis over more than half of the shorter one,
-/// and are as wide. One of which the end was not felt goes on in what was not felt at all, if that
-/// is as near as pieces of one wall are.
+/// Whether two holes, or two bosses, of the same width overlap along one axis over more than half
+/// of the shorter one. A wall with an untouched end goes on in an untouched wall no farther off
+/// than pieces of one wall are.
 fn is_one_wall(one: &Feature, other_feature: &Feature) -> bool {
-    // from its bottom to its opening, or from its foot to its top, and how wide
+    // bottom or foot, axis, depth to the opening or top, diameter
     let wall = |feature: &Feature| {
         let (axis, depth) = (feature.axis.as_ref()?.value, feature.depth.as_ref()?.value);
         let is_hole = matches!(feature.kind, Kind::Hole | Kind::Notch);
@@ -326,7 +323,7 @@ fn is_one_wall(one: &Feature, other_feature: &Feature) -> bool {
         && aside < near
 }
 
-/// Slots and pockets by contacts, and those of the mesh that are none of them.
+/// Slots and pockets by contacts, and all others of the mesh.
 fn with_felt(felt: Vec<Slot>, (slots, pockets): (Vec<Slot>, Vec<Slot>)) -> (Vec<Slot>, Vec<Slot>) {
     let is_new = |slot: &Slot| felt.iter().all(|one| !one.holds(slot));
     let [slots, pockets] =
@@ -339,7 +336,7 @@ fn with_felt(felt: Vec<Slot>, (slots, pockets): (Vec<Slot>, Vec<Slot>)) -> (Vec<
     )
 }
 
-/// Whether a wall is the half-round end of a slot: with its corners it may look like more than half
+/// Whether a wall is the half-round end of a slot: with the corners it may look like more than half
 /// a turn.
 fn is_slot_end(wall: &Wall, slots: &[Slot]) -> bool {
     slots.iter().any(|slot| {
@@ -352,7 +349,7 @@ fn is_slot_end(wall: &Wall, slots: &[Slot]) -> bool {
     })
 }
 
-/// A wall is an end of a slot when width and place agree within this share of the width.
+/// Maximum difference of width and place between a slot and its end wall, in widths.
 const ALIKE: f64 = 0.2;
 
 fn is_sure_plane(parted: &Parted, number: usize) -> bool {
@@ -360,20 +357,20 @@ fn is_sure_plane(parted: &Parted, number: usize) -> bool {
     segment.is_exact || segment.area > (SURE_WIDTH * segment.tolerance).powi(2)
 }
 
-/// Where an axis meets a plane, or ends.
+/// Intersection of an axis with a surface, or end of the axis.
 #[derive(Clone, Debug, Default)]
 struct AxisEnd {
-    /// the place; its uncertainty is along the axis
+    /// place, with its uncertainty along the axis
     place: Measured<Point3<f64>>,
-    /// standard deviation along the axis without what all touches have in common, m
+    /// standard deviation along the axis without the common error of all touches, m
     own_std: Option<f64>,
-    /// what its touches have in common along the axis, m
+    /// common error of its touches along the axis, m
     systematic: f64,
 }
 
-/// Distance of two parallel ends along `direction`, each with its uncertainty.
+/// Distance between two parallel ends along `direction`, with its uncertainty.
 fn between(from: &AxisEnd, to: &AxisEnd, direction: &Vector3<f64>) -> Measured<f64> {
-    // touched from one side, both are off alike by most of what touches have in common
+    // touched from one side, both ends share most of the common error of touches
     let common = NOT_ALIKE * from.systematic.hypot(to.systematic);
     let std = from
         .own_std
@@ -387,12 +384,12 @@ fn between(from: &AxisEnd, to: &AxisEnd, direction: &Vector3<f64>) -> Measured<f
     )
 }
 
-/// A lower bound leaves out so many standard deviations of the leans of the touches on its wall, in
-/// radii of the ball.
+/// Margin of a lower bound, in standard deviations of the lean of touches on its wall, times the
+/// radius of the ball.
 const LEAN_SIGMAS: f64 = 3.0;
 
-/// From one end of a wall to the other. Where the wall was felt and an end was not, that may be a
-/// guess: then it is as far as the wall was felt, and a lower bound.
+/// Distance between the ends of a wall. An untouched end of a touched wall may be a guess: the
+/// distance is then the touched extent of the wall, a lower bound.
 fn extent<S>(
     measure: &Measure,
     fitted: &Fitted<S>,
@@ -406,7 +403,7 @@ fn extent<S>(
     }
     let side = (to.place.value - from.place.value).dot(out).signum();
     let along = |point: &Point3<f64>| (point - from.place.value).dot(out) * side;
-    // the ball is as high as its contact, or as its measured normal leans: whatever is less far
+    // height of a touch: the less far of its centre and its point by the measured normal
     let of_wall = || {
         fitted
             .touches
@@ -417,7 +414,7 @@ fn extent<S>(
     let (lowest, highest) = heights.fold((f64::MAX, f64::MIN), |(low, high), [a, b]| {
         (low.min(a.max(b)), high.max(a.min(b)))
     });
-    // what rolled over the edge leans as others lean by friction and noise, and is farther than it
+    // a touch over the edge leans as others lean by friction and noise, and is farther than it
     // seems
     let leans: f64 = of_wall().map(|touch| touch.normal.dot(out).powi(2)).sum();
     let radius = of_wall().map(|touch| touch.radius).fold(0.0, f64::max);
@@ -437,7 +434,7 @@ fn extent<S>(
 }
 
 impl AxisEnd {
-    /// Where the axis leaves plane or cylinder number `land`; else `point`.
+    /// Exit of the axis from plane or cylinder number `land`; else `point`.
     fn on(
         measure: &Measure,
         land: Option<usize>,
@@ -461,7 +458,7 @@ impl AxisEnd {
         )
     }
 
-    /// Where the axis meets a plane that was felt; else `point`.
+    /// Intersection of the axis with a touched plane; else `point`.
     fn met(
         measure: &Measure,
         plane: &Fitted<Plane>,
@@ -494,9 +491,9 @@ impl AxisEnd {
         }
     }
 
-    /// As the place of a feature with a fitted surface.
+    /// Centre of a feature with a fitted surface, at this end.
     ///
-    /// - `std`: of the place, from the fit, m.
+    /// - `std`: standard deviation of the centre, from the fit, m.
     fn centre<S: Surface>(
         &self,
         fitted: &Fitted<S>,
@@ -507,7 +504,7 @@ impl AxisEnd {
     }
 }
 
-/// What was touched over this share of a turn is round.
+/// Minimum touched share of a turn of a hole; less at a rim is a notch.
 const WHOLE_TURN: f64 = 0.8;
 
 fn hole_feature(measure: &Measure, walls: &[Wall], hole: &Hole) -> Feature {
@@ -524,12 +521,12 @@ fn hole_feature(measure: &Measure, walls: &[Wall], hole: &Hole) -> Feature {
         .surface
         .nearest_on_axis(&(hole.opening - hole.out * hole.depth));
     let floor = AxisEnd::on(measure, hole.floor, &bottom, &axis.value);
-    // beside a wall that was touched, a floor that was not may be a guess
+    // beside a touched wall an untouched floor may be a guess
     let is_known =
         hole.floor.is_none() || fitted.to == FittedTo::Mesh || !floor.place.touches.is_empty();
     let centre = opening.centre(&fitted, |fit| fit.lateral_std(&opening.place.value));
     let touched = measure.observed.touched_share(&wall.segments);
-    // where the mesh has a gap the touches may go all around
+    // at a gap of the mesh the touches may go all around
     let is_notch =
         hole.is_notch && measure.turn(&fitted.touches, wall).max(wall.felt_turn) < WHOLE_TURN;
     let cone = hole.countersink.and_then(|cone| measure.cone(&walls[cone]));
@@ -557,10 +554,10 @@ fn hole_feature(measure: &Measure, walls: &[Wall], hole: &Hole) -> Feature {
     }
 }
 
-/// A rim is of a wall when it is no farther from its axis, and from its ends, than this many radii.
+/// Maximum distance of a rim from the axis, and from the ends, of its wall, in radii.
 const OF_WALL: f64 = 0.5;
 
-/// Whether a round opening is an end of a hole that has a wall.
+/// Whether a round opening is an end of a hole with this wall.
 fn is_rim_of(wall: &Wall, rim: &RoundOpening) -> bool {
     let (v, near) = (rim.centre - wall.origin, OF_WALL * wall.radius());
     let along = v.dot(&wall.axis);
@@ -568,7 +565,7 @@ fn is_rim_of(wall: &Wall, rim: &RoundOpening) -> bool {
     is_between && (v - wall.axis * along).norm() < near
 }
 
-/// A hole of which there is no wall: how deep it is and whether it goes through is not known.
+/// A hole without a wall: its depth, and whether it goes through, are unknown.
 fn rim_feature(measure: &Measure, rim: &RoundOpening) -> Feature {
     let (surface, fit, is_confirmed) = (
         rim.fit.surface,
@@ -599,12 +596,12 @@ fn rim_feature(measure: &Measure, rim: &RoundOpening) -> Feature {
     }
 }
 
-/// A wall is of an outline when it is about its axis and no narrower than its circle by this factor:
-/// broken edges and fillets are between both.
+/// Maximum radius of an outline around the axis of its wall, in radii of the wall: broken edges and
+/// fillets are between both.
 const BROKEN_EDGE: f64 = 1.25;
 
-/// What is cut into the planes of a drawing or stands on them and is none of these walls, slots and
-/// pockets, whatever its outline is.
+/// Cuts into the planes of a drawing, and bosses on them, of any outline, except for these walls,
+/// slots and pockets.
 fn of_other_outline(measure: &Measure, round: &[&Wall], flat: &[&Slot]) -> Vec<Feature> {
     let parted = measure.observed.parted;
     if parted.rounding.is_none() {
@@ -768,7 +765,7 @@ fn slot_feature(measure: &Measure, slot: &Slot, kind: Kind) -> Feature {
     }
 }
 
-/// Whether both planes were measured by touch.
+/// [`FittedTo::Touches`] if all planes are fitted to touches, else the mesh.
 fn fitted_to(planes: &[&Fitted<Plane>]) -> FittedTo {
     let is_touched = planes.iter().all(|plane| plane.to == FittedTo::Touches);
     if is_touched {
@@ -778,8 +775,8 @@ fn fitted_to(planes: &[&Fitted<Plane>]) -> FittedTo {
     }
 }
 
-/// A place of a concave edge is touched when a touch is within a radius of where this share of it
-/// stands off both its walls.
+/// Offset from both walls at which a concave edge counts as touched, in radii of the ball: touches
+/// cover places within a radius.
 const IN_CORNER: f64 = 0.5;
 
 fn edge_feature(measure: &Measure, edge: &StraightEdge) -> Option<Feature> {
@@ -812,8 +809,8 @@ fn edge_feature(measure: &Measure, edge: &StraightEdge) -> Option<Feature> {
     })
 }
 
-/// Ends of edges closer together than this are one corner, in diagonals; of exact planes: what is
-/// farther off is round.
+/// Maximum distance from a corner to the ends of its edges, in diagonals; the second for exact
+/// planes: a larger distance means a round corner.
 const SAME_CORNER: f64 = 0.02;
 const SAME_EXACT_CORNER: f64 = 1e-4;
 
@@ -848,7 +845,7 @@ fn corners(parted: &Parted, measure: &Measure, edges: &[StraightEdge]) -> Vec<Fe
     found.into_iter().map(|(_, corner)| corner).collect()
 }
 
-/// Volume that three unit normals span, at least: 10° from a common plane.
+/// Minimum volume that three unit normals span: 10° from a common plane.
 const SPATIAL: f64 = 0.17;
 
 fn corner_of(measure: &Measure, planes: [usize; 3]) -> Option<Feature> {

@@ -1,4 +1,4 @@
-//! What is found: one feature, its numbers, and the data behind them.
+//! One feature, its numbers, and the data behind them.
 
 use nalgebra::{Point3, Vector3};
 
@@ -7,10 +7,10 @@ use crate::form::{Element, FlatForm, RoundForm};
 use crate::names;
 
 names! {
-    /// What a feature is.
+    /// Kind of a feature.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
     pub enum Kind {
-        /// round, through or blind; a stepped one is several of one group
+        /// round, through or blind; a stepped hole is several holes of one group
         Hole = "hole",
         /// between two parallel walls
         Slot = "slot",
@@ -20,7 +20,7 @@ names! {
         Boss = "boss",
         /// straight, between two planes
         Edge = "edge",
-        /// where three planes meet
+        /// intersection of three planes
         Corner = "corner",
         /// flat
         #[default]
@@ -33,32 +33,32 @@ names! {
 }
 
 names! {
-    /// What the numbers of a feature were fitted to.
+    /// Data behind the numbers of a feature.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
     pub enum FittedTo {
         /// touches
         Touches = "touches",
-        /// the mesh: too little of it was touched
+        /// the mesh, with too few touches
         #[default]
         Mesh = "mesh",
     }
 }
 
-/// A number, how well it is known, and the touches that it comes from.
+/// A number, its uncertainty, and its touches.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Measured<T> {
     /// m, rad, or a point, m
     pub value: T,
-    /// standard uncertainty, m or rad; `None` where nothing determines it
+    /// standard uncertainty, m or rad; `None` if undetermined
     pub std: Option<f64>,
-    /// numbers of the touches, in ascending order; none where it was fitted to the mesh
+    /// numbers of the touches, in ascending order; none for a fit to the mesh
     pub touches: Vec<u32>,
-    /// whether it is a lower bound: as far as was felt, and the end was not
+    /// whether the value is a lower bound: a touched extent with an untouched end
     pub is_at_least: bool,
 }
 
 impl<T> Measured<T> {
-    /// A value that is no bound.
+    /// A value other than a bound.
     pub fn new(value: T, std: Option<f64>, touches: Vec<u32>) -> Self {
         Self {
             value,
@@ -72,13 +72,13 @@ impl<T> Measured<T> {
 /// A feature of the part, in O.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Feature {
-    /// stays the same while the feature is refined
+    /// constant during refinement
     pub id: u32,
-    /// what it is
+    /// kind of feature
     pub kind: Kind,
-    /// where the axis goes through the opening, the middle of a boss' foot, of a shaft's shoulder
-    /// or else of its length, of an edge, of a plane; the corner. Its uncertainty is the root mean
-    /// square distance across the axis, of a plane along its normal.
+    /// intersection of the axis with the opening; middle of a boss' foot, of a shaft's shoulder or
+    /// else of its length, of an edge, of a plane; the corner. Its uncertainty is the root mean
+    /// square distance across the axis, for a plane along the normal.
     pub centre: Measured<Point3<f64>>,
     /// out of the opening, along an edge, the outward normal of a plane; unit vector. Its
     /// uncertainty is an angle, rad.
@@ -94,8 +94,8 @@ pub struct Feature {
     /// from opening to floor, or the height of a boss, or of a step of a shaft above its shoulder,
     /// m
     pub depth: Option<Measured<f64>>,
-    /// whether a hole or slot goes through; `None` where the mesh ends before the hole does, or its
-    /// floor was not touched
+    /// whether a hole or slot goes through; `None` if the mesh ends before the hole does, or its
+    /// floor is untouched
     pub through: Option<bool>,
     /// full angle of the countersink, rad
     pub cone_angle: Option<Measured<f64>>,
@@ -105,22 +105,22 @@ pub struct Feature {
     pub points: Vec<Point3<f64>>,
     /// whether the material is inside of an edge
     pub is_convex: Option<bool>,
-    /// share of its surface that was touched
+    /// touched share of its surface
     pub touched: f64,
-    /// what its numbers were fitted to
+    /// data behind its numbers
     pub fitted_to: FittedTo,
-    /// the walls that its sizes are of, where it has some
+    /// walls that its sizes describe, if any
     pub walls: Option<Walls>,
-    /// how far its surface is off its ideal form, if it was fitted to touches or drawn
+    /// deviation of its surface from the ideal form, if fitted to touches or drawn
     pub form: Option<Form>,
-    /// in a drawing, how far the flat facets of its round walls lie inside the surface through their
-    /// corners, m; `None` if they do not
+    /// in a drawing, distance of the flat facets of its round walls inside the surface through
+    /// their corners, m; `None` if they do not lie inside
     pub facets: Option<f64>,
-    /// its axis or plane as an element of relations, where it was fitted to touches
+    /// its axis or plane as an element of relations, if fitted to touches
     pub element: Option<Element>,
 }
 
-/// Form of a feature over what was touched of it.
+/// Form of a feature over its touched surface.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Form {
     /// of a hole, notch, boss or cylinder
@@ -139,7 +139,7 @@ pub enum Walls {
 }
 
 impl Feature {
-    /// Numbers of the touches that its sizes come from; one may come again.
+    /// Numbers of the touches behind its sizes, with repetitions.
     pub(crate) fn touch_numbers(&self) -> impl Iterator<Item = u32> {
         let sizes = [&self.diameter, &self.width, &self.length]
             .into_iter()
@@ -147,7 +147,7 @@ impl Feature {
         sizes.flat_map(|size| size.touches.iter().copied())
     }
 
-    /// A feature without numbers but its place.
+    /// A feature with no numbers but its centre.
     pub(super) fn new(
         kind: Kind,
         centre: Measured<Point3<f64>>,

@@ -1,4 +1,4 @@
-//! Features whose surfaces were fitted to single touches, before any mesh shows them.
+//! Features with surfaces fitted to single touches, before any mesh shows them.
 
 use nalgebra::{Point3, Vector3};
 
@@ -9,7 +9,7 @@ use super::fit::{Cylinder, Fit, Freedom, Plane, Stadium, Surface};
 /// Numbers of touches, in ascending order.
 pub(super) type Touches = Vec<u32>;
 
-/// A place where a hole or slot ends, or the top of a boss.
+/// The end of a hole or slot, or the top of a boss.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct End {
     /// on the surface, m in O
@@ -19,11 +19,11 @@ pub struct End {
 }
 
 impl Feature {
-    /// A hole, or a boss when the wall is convex.
+    /// A hole, or a boss if the wall is convex.
     ///
-    /// - `top`: around the opening, or the foot of the boss; `end`: of the floor, or the boss' top,
-    ///   where it was touched.
-    /// - `touches`: those used.
+    /// - `top`: plane around the opening, or the foot of the boss; `end`: on the floor, or the
+    ///   boss' top, if touched.
+    /// - `touches`: used touches.
     pub fn round(
         wall: &Fit<Cylinder>,
         top: &Fit<Plane>,
@@ -52,7 +52,7 @@ impl Feature {
         }
     }
 
-    /// A slot: its walls, the surface around its opening, and its floor where it was touched.
+    /// A slot: its walls, the plane around its opening, and its floor if touched.
     pub fn slot(
         wall: &Fit<Stadium>,
         top: &Fit<Plane>,
@@ -85,8 +85,8 @@ impl Feature {
         }
     }
 
-    /// The edge between two planes, as far as from one place on it to another; `None` when they are
-    /// parallel.
+    /// The edge between two planes, from the first of `ends` to the second; `None` if the planes
+    /// are parallel.
     ///
     /// - `ends`: near the edge, m in O.
     pub fn edge(
@@ -110,10 +110,10 @@ impl Feature {
         })
     }
 
-    /// The edge in which two planes meet, as far as from one place near it to another: its axis,
-    /// the sine between the planes, and the rest; `None` when they are parallel.
+    /// The edge between two planes, from the first of `ends` to the second: its axis, the sine of
+    /// the angle between the planes, and the feature; `None` if the planes are parallel.
     ///
-    /// - `std_at`: of a plane along its normal at a point of it, m.
+    /// - `std_at`: standard deviation of a plane along its normal at one of its points, m.
     pub(super) fn crossing(
         planes: [&Plane; 2],
         std_at: impl Fn(usize, &Point3<f64>) -> Option<f64>,
@@ -141,7 +141,7 @@ impl Feature {
         Some((axis, sine, edge))
     }
 
-    /// A plane, at the place of it that is nearest to `middle`.
+    /// A plane, centred at its point nearest to `middle`.
     pub fn plane(plane: &Fit<Plane>, middle: &Point3<f64>, touches: Touches) -> Self {
         let normal = plane.surface.normal();
         let centre = met(&plane.surface, middle, &normal);
@@ -161,13 +161,13 @@ impl Feature {
     }
 }
 
-/// Where a line meets a plane, m in O.
+/// Intersection of a line with a plane, m in O.
 fn met(plane: &Plane, from: &Point3<f64>, direction: &Vector3<f64>) -> Point3<f64> {
     let normal = plane.normal();
     from + direction * ((plane.point() - from).dot(&normal) / direction.dot(&normal))
 }
 
-/// Its direction, with the sign of `out`.
+/// Direction of a fit, with the sign of `out`.
 pub(super) fn axis_of<S: Surface>(
     fit: &Fit<S>,
     out: &Vector3<f64>,
@@ -180,7 +180,7 @@ pub(super) fn axis_of<S: Surface>(
     )
 }
 
-/// A number with its derivatives by the freedoms.
+/// A number with its uncertainty, from its derivatives by the freedoms.
 pub(super) fn number<S: Surface>(
     fit: &Fit<S>,
     value: f64,
@@ -190,7 +190,7 @@ pub(super) fn number<S: Surface>(
     Measured::new(value, fit.std_by(by), touches.clone())
 }
 
-/// Distance of a place from a plane, m.
+/// Distance of an end from a plane, m.
 fn apart(plane: &Fit<Plane>, end: &End, touches: &Touches) -> Measured<f64> {
     let value = (end.point - plane.surface.point())
         .dot(&plane.surface.normal())

@@ -1,4 +1,4 @@
-//! The surfaces of features, measured: fitted to what was touched, or to the mesh.
+//! Surfaces of features, fitted to touches or to the mesh.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -17,20 +17,19 @@ use super::walls::Wall;
 use crate::numeric::{order_statistic, spreads, tangent_basis};
 use crate::stylus::ProbedPoint;
 
-/// A fitted surface and what it was fitted to.
+/// A fitted surface and its data.
 #[derive(Clone, Debug)]
 pub(super) struct Fitted<S> {
     pub surface: S,
-    /// `None` where no fit held: the surface is that of the segments
+    /// `None` if no fit held: the surface comes from the segments
     pub fit: Option<Fit<S>>,
-    /// numbers of the touches that were used
+    /// numbers of the used touches
     pub touches: Vec<u32>,
     pub to: FittedTo,
-    /// of a mesh the root mean square of its residuals, m
+    /// for a mesh, root mean square residual, m
     pub uneven: f64,
-    /// whether the residuals say how far the surface is off: those of touches do, and those of a
-    /// mesh that nothing touched; beside touches they are of a surface that nobody felt, which may
-    /// be off as a whole
+    /// whether the residuals give the error of the surface: true for touches, and for a mesh
+    /// without touches; beside touches, an untouched surface may be off as a whole
     pub is_confirmed: bool,
 }
 
@@ -40,32 +39,31 @@ pub(super) struct Measure<'a> {
     planes: RefCell<BTreeMap<usize, Fitted<Plane>>>,
 }
 
-/// Fewer touches than this on a surface are left to the mesh.
+/// Minimum number of touches on a surface; fewer leave it to the mesh.
 pub const LEAST_TOUCHES: usize = 12;
-/// Touches around less of a turn than this are left to the mesh.
+/// Minimum touched share of a turn; less leaves the wall to the mesh.
 pub const LEAST_TURN: f64 = 0.4;
-/// Touches on a plane that spread less than this share across their longest direction are left to
-/// the mesh; beside an edge they are enough when they spread over this share of what the mesh has.
+/// Minimum ratio of transverse to longest spread of touches on a plane; less leaves it to the mesh.
 const LEAST_SPREAD: f64 = 0.1;
+/// Minimum ratio of the transverse spread of touches beside an edge to the spread of the mesh.
 const LEAST_STRIP: f64 = 0.4;
-/// Into so many parts a turn is divided.
+/// Number of parts of a turn.
 const PARTS: usize = 24;
-/// A wall touched over less than this many diameters of its height has its axis from the plane
-/// around it.
+/// Minimum touched height of a wall for an axis of its own, in diameters; below it the plane around
+/// the wall gives the axis.
 const SHORT: f64 = 0.35;
-/// A touch beside the outline of a slot by less than this share of its width is of it.
+/// Maximum distance of a touch from the outline of its slot, in widths of the slot.
 const BESIDE: f64 = 0.15;
-/// A touch is of the edge at an end of a wall when it is nearer to it than this, in radii of the
-/// ball …
+/// Maximum distance from an end of a wall to a touch of the edge there, in radii of the ball.
 const OVER_END: f64 = 0.3;
-/// … and its normal leans towards it by more than this, rad: 15°.
+/// Minimum lean of the normal at that edge towards the end of the wall, rad: 15°.
 const OVER_END_LEAN: f64 = 0.26;
-/// Leans that are tried in turn, sines: 9°, which friction leaves, and 12°.
+/// Maximum leans in order of trial, sines: 9°, which friction leaves, and 12°.
 const LEANS: [f64; 2] = [0.15, 0.2];
 /// Perpendicularity of a drilled hole or milled slot to the plane around it, rad: 0.5°.
 const DRILLED: f64 = 0.0087;
 
-/// Whether the ball touched the edge at an end of a wall: there it is nearer to the axis, or
+/// Whether the ball touched the edge at an end of a wall: there the ball is nearer to the axis, or
 /// farther from it, than beside the wall.
 fn is_over_end(touch: &ProbedPoint, wall: &Wall) -> bool {
     let along = (touch.point - wall.origin).dot(&wall.axis);
@@ -100,8 +98,8 @@ impl<'a> Measure<'a> {
         Some(fitted)
     }
 
-    /// The plane of a segment beside an edge: a strip of touches along the edge places it, where it
-    /// is wide beside what the mesh has of the plane. `None` where the segment is none.
+    /// The plane of a segment beside an edge: a strip of touches along the edge places the plane,
+    /// if wide in comparison with the mesh of the plane. `None` for other segments.
     pub fn plane_beside_edge(&self, number: usize) -> Option<Fitted<Plane>> {
         let plane = self.plane(number)?;
         if plane.to == FittedTo::Touches {
@@ -116,8 +114,8 @@ impl<'a> Measure<'a> {
         );
         let is_wide = |[_, second, _]: [f64; 3]| second > LEAST_STRIP * of_mesh;
         let first = self.plane_by(number, guess, is_wide);
-        // a mesh rounds the corner between two walls and leans there: touches by the first plane
-        // are others than by the mesh
+        // a mesh rounds the corner between two walls and leans there: the first plane selects other
+        // touches than the mesh does
         let is_felt = first.to == FittedTo::Touches;
         Some(if is_felt {
             self.plane_by(number, &first.surface, is_wide)
@@ -126,7 +124,7 @@ impl<'a> Measure<'a> {
         })
     }
 
-    /// - `is_wide`: whether touches that spread so far in three directions, m, the least first, are
+    /// - `is_wide`: whether touches with these spreads in three directions, m, ascending, are
     ///   enough.
     fn plane_by(
         &self,
@@ -160,7 +158,7 @@ impl<'a> Measure<'a> {
         )
     }
 
-    /// The plane through touches, about square to `normal`; `None` where there are none.
+    /// The plane through touches, about square to `normal`; `None` without touches.
     pub fn felt_plane(
         &self,
         touches: &[u32],
@@ -179,7 +177,7 @@ impl<'a> Measure<'a> {
         })
     }
 
-    /// The cylinder of a segment; `None` where it is none.
+    /// The cylinder of a segment; `None` for other segments.
     pub fn shaft(&self, number: usize) -> Option<Fitted<Cylinder>> {
         let Primitive::Cylinder(guess) = self.observed.parted.segment(number).primitive else {
             return None;
@@ -248,7 +246,7 @@ impl<'a> Measure<'a> {
         ))
     }
 
-    /// The touches of a wall, where they are enough around it; else none.
+    /// The touches of a wall, if enough in number and around the axis; else none.
     fn touches_around(&self, wall: &Wall) -> Vec<u32> {
         let mut touches = self.observed.touches_of(&wall.segments);
         touches.retain(|&number| !is_over_end(self.observed.touch(number), wall));
@@ -270,12 +268,12 @@ impl<'a> Measure<'a> {
         )
     }
 
-    /// The touches whose normals lean least off that of their surface, where they are enough; none
-    /// where all are not. A ball that rolls over an edge leans more and more, and its centre comes
+    /// The touches whose normals lean least off the normals of their surface, if enough; none if
+    /// all are too few. A ball that rolls over an edge leans more and more, and its centre comes
     /// nearer to the surface than its radius.
     ///
     /// - `lean`: sine of the angle between the normal of a touch and the normals of the surface.
-    /// - `is_inside`: whether a touch that leans is of the surface and not of its edge.
+    /// - `is_inside`: whether a leaning touch is on the surface and not on its edge.
     fn squarest(
         &self,
         mut touches: Vec<u32>,
@@ -298,8 +296,8 @@ impl<'a> Measure<'a> {
         }
     }
 
-    /// Whether a ball is above what some touches felt of a plane: over an edge its centre goes on
-    /// while its contact stays.
+    /// Whether the centre of a ball is above the touched part of a plane: over an edge the centre
+    /// goes on while the contact stays.
     fn inside(
         &self,
         touches: &[u32],
@@ -333,7 +331,7 @@ impl<'a> Measure<'a> {
             ends,
             true,
         );
-        // its walls and ends may go on beyond it, and its corners may be round
+        // walls and ends may go on beyond the slot, and its corners may be round
         let is_of = |p: &Point3<f64>, is_wall: bool| {
             let q = guess.pose_of.inverse_transform_point(p);
             let room = BESIDE * slot.width * if ends == Ends::Round { 1.0 } else { -1.0 };
@@ -381,10 +379,10 @@ impl<'a> Measure<'a> {
         self.fitted(&guess, touches, &of_mesh, Some(DRILLED), Some(slot.land))
     }
 
-    /// Fits to touches; where there are none, or it fails, to the mesh.
+    /// Fits to touches; without touches, or if that fit fails, to the mesh.
     ///
-    /// - `around`: number of the plane that says how uneven the mesh is there: a small surface
-    ///   follows its waves.
+    /// - `around`: number of the plane that gives the unevenness of the mesh: a small surface
+    ///   follows the waves of the mesh.
     fn fitted<S: Surface>(
         &self,
         guess: &S,
@@ -462,7 +460,7 @@ impl<'a> Measure<'a> {
         parts.iter().filter(|&&part| part).count() as f64 / PARTS as f64
     }
 
-    /// Between the lowest and the highest tenth of the touches along the axis of a wall, m.
+    /// Distance between the lowest and the highest tenth of touches along the axis of a wall, m.
     fn height(&self, touches: &[u32], wall: &Wall) -> f64 {
         let along =
             |&number: &u32| (self.observed.touch(number).point - wall.origin).dot(&wall.axis);
@@ -474,7 +472,7 @@ impl<'a> Measure<'a> {
 }
 
 impl Fitted<Plane> {
-    /// Where a line meets the plane, m; its uncertainty is along the normal.
+    /// Intersection of a line with the plane, m; its uncertainty is along the normal.
     pub fn met(
         &self,
         from: &Point3<f64>,
@@ -485,7 +483,7 @@ impl Fitted<Plane> {
 }
 
 impl Fitted<Cylinder> {
-    /// Where a line leaves the cylinder, m; its uncertainty is along the normal there.
+    /// Exit of a line from the cylinder, m; its uncertainty is along the normal there.
     pub fn met(
         &self,
         from: &Point3<f64>,
@@ -502,8 +500,8 @@ impl<S: Surface> Fitted<S> {
         Measured::new(value, std, self.touches.clone())
     }
 
-    /// The standard deviation at a place without what all touches have in common, m: of a mesh two
-    /// surfaces have nothing in common.
+    /// Standard deviation at a place without the common error of all touches, m: two surfaces of a
+    /// mesh have no common error.
     pub fn own_std_at(&self, place: &Point3<f64>) -> Option<f64> {
         self.confirmed().and_then(|fit| match self.to {
             FittedTo::Touches => fit.own_std_at(place),
@@ -511,7 +509,7 @@ impl<S: Surface> Fitted<S> {
         })
     }
 
-    /// The fit, where its standard deviations are those of the surface.
+    /// The fit, if its standard deviations hold for the surface.
     pub fn confirmed(&self) -> Option<&Fit<S>> {
         self.fit.as_ref().filter(|_| self.is_confirmed)
     }
@@ -526,7 +524,7 @@ impl<S: Surface> Fitted<S> {
         )
     }
 
-    /// A fitted number, or its value without a fit.
+    /// A number with its uncertainty, if the fit is confirmed.
     pub fn number(&self, value: f64, by: &[(Freedom, f64)]) -> Measured<f64> {
         Measured::new(
             value,

@@ -1,9 +1,8 @@
-//! What a mesh and the touches on it are made of: holes, slots, pockets, bosses, edges, corners and
-//! planes.
+//! Features of a mesh and its touches: holes, slots, pockets, bosses, edges, corners and planes.
 //!
-//! The mesh is parted into planes, cylinders and cones ; what they make together is named, and
-//! measured by the touches on it where there are enough, else by the mesh ([`detect`]).
-//! [`curvature`] and its [`clusters`] are the paper's method for the places of features.
+//! [`detect`] segments the mesh into planes, cylinders and cones, names the features that they
+//! form, and measures each by its touches if there are enough, else by the mesh. [`curvature`] and
+//! its [`clusters`] are the paper's method for the places of features.
 
 mod bodies;
 mod borders;

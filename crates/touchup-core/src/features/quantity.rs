@@ -67,7 +67,7 @@ impl InspectedQuantity {
         Self::ConeAngle,
     ];
 
-    /// A value in m or rad, in the unit of the name.
+    /// Converts a value in m or rad to the unit of the name.
     pub fn from_si(self, value: f64) -> f64 {
         match self.unit() {
             "deg" => value.to_degrees(),
@@ -85,8 +85,8 @@ impl InspectedQuantity {
         self.parts().1
     }
 
-    /// Whether it is a width of 0 at best: its tolerance is an upper limit alone, and its nominal
-    /// value is 0.
+    /// Whether the quantity is a width of 0 at best: its tolerance is only an upper limit, and its
+    /// nominal value is 0.
     pub fn is_zone(self) -> bool {
         matches!(
             self,
@@ -102,7 +102,7 @@ impl InspectedQuantity {
         )
     }
 
-    /// Whether it relates the feature to another one.
+    /// Whether the quantity relates the feature to another feature.
     pub fn needs_datum(self) -> bool {
         matches!(
             self,
@@ -115,12 +115,12 @@ impl InspectedQuantity {
         )
     }
 
-    /// Whether its value depends on the nominal place of the feature.
+    /// Whether the value depends on the nominal place of the feature.
     pub fn needs_place(self) -> bool {
         self == Self::Position
     }
 
-    /// Whether features of that kind have it.
+    /// Whether features of this kind have the quantity.
     pub fn is_of(self, kind: Kind) -> bool {
         let is_round = matches!(kind, Kind::Hole | Kind::Boss | Kind::Cylinder | Kind::Notch);
         let is_slot = matches!(kind, Kind::Slot | Kind::Pocket);

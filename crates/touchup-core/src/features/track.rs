@@ -1,8 +1,8 @@
-//! Features followed while they are touched: the same number for the same feature, and new touches
-//! in its numbers at once.
+//! Tracking of features during touching: a feature keeps its id, and its numbers include new
+//! touches at once.
 //!
-//! [`Tracker::renew`] detects in the whole mesh; between two detections [`Tracker::update`] takes
-//! new touches into the features that they are on, and leaves all others as they are.
+//! [`Tracker::renew`] detects in the whole mesh; between two detections [`Tracker::update`] adds
+//! new touches to the features under them, and leaves all others unchanged.
 
 use nalgebra::Vector3;
 
@@ -15,45 +15,44 @@ use crate::mesh::TriMesh;
 use crate::numeric::distinct;
 use crate::stylus::ProbedPoint;
 
-/// Follows the features of one part.
+/// Tracks the features of one part.
 #[derive(Clone, Debug, Default)]
 pub struct Tracker {
     features: Vec<Feature>,
-    /// share of the area that belonged to no primitive at the last detection
+    /// share of the area outside all primitives at the last detection
     unexplained: Option<f64>,
     next_id: u32,
-    /// touches that were examined
+    /// number of examined touches
     seen: usize,
-    /// stamp of the last of them, ns
+    /// stamp of the last examined touch, ns
     until_ns: Option<i64>,
 }
 
-/// Features are the same when their places are nearer than this share of their size …
+/// Maximum distance between places of the same feature, and of sizes, as a share of the size.
 const SAME_PLACE: f64 = 0.5;
-/// … and their axes within 30°.
+/// Minimum cosine between axes of the same feature: 30°.
 const SAME_AXIS: f64 = 0.866;
-/// A touch is of a feature when it is off its surface by no more than this share of the ball's
-/// radius …
+/// Maximum distance of a touch from the surface of its feature, in radii of the ball.
 const NEAR_RADII: f64 = 0.15;
-/// … and its normal by no more than 40°.
+/// Minimum cosine between the normals of a touch and of its feature: 40°.
 const ALIKE: f64 = 0.77;
-/// So many touches of a feature are fitted between two detections, spread over all of them.
+/// Maximum number of touches in a fit between two detections, spread over all of a feature.
 const MOST_FITTED: usize = 240;
-/// Where the tip is no ball, this counts as its radius, m.
+/// Radius assumed for a tip that is no ball, m.
 const RADIUS: f64 = 1e-3;
 
 impl Tracker {
-    /// Nothing found yet.
+    /// A tracker without features.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// What is known now, in order of id.
+    /// Known features, in order of id.
     pub fn features(&self) -> &[Feature] {
         &self.features
     }
 
-    /// Detects features in the whole mesh again; features that were known keep their ids.
+    /// Detects features in the whole mesh again; known features keep their ids.
     pub fn renew(&mut self, mesh: &TriMesh, touches: &[ProbedPoint]) -> &[Feature] {
         let Detection {
             mut features,
@@ -83,24 +82,24 @@ impl Tracker {
         self.until_ns = touches.last().map(|last| last.stamp_ns);
     }
 
-    /// Share of the mesh's area left out of the last detection on the whole mesh; `None` before the
+    /// Share of the mesh's area outside all primitives at the last detection; `None` before the
     /// first.
     pub fn unexplained(&self) -> Option<f64> {
         self.unexplained
     }
 
-    /// A number that no feature has, had or will get: for what is known before it is found.
+    /// A new id, which no feature has, had or will get: for features known before detection.
     pub fn fresh_id(&mut self) -> u32 {
         self.next_id += 1;
         self.next_id - 1
     }
 
-    /// Takes the touches that came since into the holes, bosses, slots and pockets that they are
-    /// on; returns the ids of those.
+    /// Adds new touches to the holes, bosses, slots and pockets under them; returns the ids of the
+    /// changed features.
     ///
-    /// - `touches`: all of them, as for [`Self::renew`]. When some that were there are gone, as
-    ///   after an undone stroke, nothing changes until the next detection in the whole mesh:
-    ///   features name touches by number.
+    /// - `touches`: all touches, as for [`Self::renew`]. If earlier touches are gone, as after an
+    ///   undone stroke, nothing changes until the next detection in the whole mesh: features refer
+    ///   to touches by number.
     pub fn update(&mut self, touches: &[ProbedPoint]) -> Vec<u32> {
         let last = self
             .seen
@@ -127,7 +126,7 @@ impl Tracker {
     }
 }
 
-/// The size that a feature's place is compared with, m.
+/// Size of a feature, the scale for differences of place, m.
 fn size(feature: &Feature) -> f64 {
     let mut sizes = [&feature.diameter, &feature.width, &feature.length]
         .into_iter()
@@ -139,7 +138,7 @@ fn is_same(one: &Feature, other: &Feature) -> bool {
     let axes = one.axis.as_ref().zip(other.axis.as_ref());
     let is_alike = axes.is_none_or(|(a, b)| a.value.dot(&b.value).abs() > SAME_AXIS);
     let off = one.centre.value - other.centre.value;
-    // a hole is the same however deep it has become
+    // the same hole may have become deeper
     let off = match (one.kind, &one.axis) {
         (Kind::Hole | Kind::Boss | Kind::Cylinder, Some(axis)) => {
             off - axis.value * off.dot(&axis.value)
@@ -188,7 +187,7 @@ fn is_on(feature: &Feature, touch: &ProbedPoint) -> bool {
 }
 
 impl Feature {
-    /// Fits the feature to its touches and the new ones; returns whether that held.
+    /// Fits the feature to its touches and the new ones; returns whether the fit held.
     fn take(&mut self, new: &[u32], touches: &[ProbedPoint]) -> bool {
         let known = self
             .main_size()
@@ -276,7 +275,7 @@ impl Feature {
         self.walls = Some(Walls::Slot(found.surface));
     }
 
-    /// The direction of a fit with the sign of the axis.
+    /// Direction of a fit, with the sign of the axis.
     fn turned<S: Surface>(&self, found: &Fit<S>, touches: &Touches) -> Measured<Vector3<f64>> {
         axis_of(
             found,
@@ -289,6 +288,6 @@ impl Feature {
     }
 }
 
-/// How well the axis is known from the last detection, rad: 1°, so that touches at one height are
-/// enough.
+/// Standard uncertainty of the axis from the last detection, rad: 1°; with it touches at one height
+/// are enough.
 const AXIS_KNOWN: f64 = 0.0175;
