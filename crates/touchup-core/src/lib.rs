@@ -4,7 +4,7 @@
 //! the same bytes. The modules, in the order in which data flows through them and in which they may
 //! use one another:
 //!
-//! | module | what it does |
+//! | module | purpose |
 //! |---|---|
 //! | [`numeric`] | quantiles, means, bases, voxels, disjoint sets, robust weights, least squares, small rigid motions |
 //! | [`mod@parameters`] | the declaration of each key of the scene: unit, range, default, documentation |
@@ -30,7 +30,7 @@
 //! of the ball in it) · W world or space, in which it is tracked (the scene gives the pose of O in
 //! it; in the simulator z is up) · V view (in the simulator alone; z: towards the scanner or the
 //! hand) · F fitted surface (in [`features`] alone; z: its axis or normal). `pose_ot` maps T to O,
-//! `p_ot` is the tip in O, `force_o` is a force expressed in O. A wrench is what the object does to
+//! `p_ot` is the tip in O, `force_o` is a force expressed in O. A wrench acts from the object on
 //! the stylus and normals point out of the object, so a stylus that presses has `force_o · normal >
 //! 0`.
 //!

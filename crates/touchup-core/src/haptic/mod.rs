@@ -722,7 +722,7 @@ impl Refiner {
         Ok(ContactEstimator::new(self.params.contact())?)
     }
 
-    /// Decides about contact, after the samples so far.
+    /// Estimator of contact, after the latest sample.
     pub fn contacts(&self) -> &ContactEstimator {
         &self.contacts
     }
