@@ -2,7 +2,7 @@
 //! in accuracy and the features.
 
 use std::fmt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use nalgebra::Point3;
@@ -89,11 +89,7 @@ reported! {
 
 /// Runs the demo live on the operator page.
 #[cfg(any(feature = "ros", feature = "r2r"))]
-fn demo_on_page(
-    web: &WebFlags,
-    out: &std::path::Path,
-    tip_radius: f64,
-) -> Result<Losses, CliError> {
+fn demo_on_page(web: &WebFlags, out: &Path, tip_radius: f64) -> Result<Losses, CliError> {
     let mut parameters = parameters_of(
         &out.join("scan.ply"),
         MeshUnit::Millimetre,
@@ -141,31 +137,18 @@ pub(super) fn demo(arguments: &DemoArguments) -> Result<Losses, CliError> {
         &arguments.out,
     )?;
 
-    let (out, unit) = (&arguments.out, MeshUnit::Millimetre);
+    let out = &arguments.out;
     #[cfg(any(feature = "ros", feature = "r2r"))]
     if arguments.web.is_wanted() {
         return demo_on_page(&arguments.web, out, stylus.radius);
     }
-    let (scan_file, recording) = (out.join("scan.ply"), out.join("touch.mcap"));
-    let (scene, told) = ToldFlags::of_radius(stylus.radius).scene(None)?;
-    let [mesh_out, features_out, touches_out] =
-        ["refined.ply", "features.json", "touches.csv"].map(|name| out.join(name));
-    let files = RefinementFiles {
-        scan: &scan_file,
-        mesh_unit: unit,
-        recording: &recording,
-        recorded: &RecordedAs::default(),
-        mesh_out: &mesh_out,
-        features_out: Some(&features_out),
-        touches_out: Some(&touches_out),
-    };
     let Refined {
         summary, losses, ..
-    } = files.refine(scene, told, RefinementOptions::default())?;
+    } = refined(out, stylus.radius)?;
     // measures the mesh as written
-    let MeshFile { mesh: refined, .. } = read_mesh(&mesh_out, unit)?;
+    let MeshFile { mesh: refined, .. } = read_mesh(&out.join(MESH), MeshUnit::Millimetre)?;
 
-    let named = read_features(&features_out)?.features;
+    let named = read_features(&out.join(FEATURES))?.features;
     let found = FoundTable::of(&plate.features(), &named);
     compared(&CompareArguments::in_folder(out, named))?;
 
@@ -189,6 +172,28 @@ pub(super) fn demo(arguments: &DemoArguments) -> Result<Losses, CliError> {
         picture.display()
     ))?;
     Ok(losses)
+}
+
+const MESH: &str = "refined.ply";
+const FEATURES: &str = "features.json";
+
+/// Refines the scan in a folder by the recording in it.
+///
+/// - `tip_radius`: m.
+fn refined(folder: &Path, tip_radius: f64) -> Result<Refined, CliError> {
+    let (scene, told) = ToldFlags::of_radius(tip_radius).scene(None)?;
+    let [scan, recording, mesh_out, features_out, touches_out] =
+        ["scan.ply", "touch.mcap", MESH, FEATURES, "touches.csv"].map(|name| folder.join(name));
+    let files = RefinementFiles {
+        scan: &scan,
+        mesh_unit: MeshUnit::Millimetre,
+        recording: &recording,
+        recorded: &RecordedAs::default(),
+        mesh_out: &mesh_out,
+        features_out: Some(&features_out),
+        touches_out: Some(&touches_out),
+    };
+    files.refine(scene, told, RefinementOptions::default())
 }
 
 impl fmt::Display for DemoSummary {

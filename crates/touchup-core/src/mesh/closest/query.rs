@@ -12,9 +12,9 @@ use crate::mesh::{FaceId, TriMesh};
 ///
 /// The point a + v·ab + w·ac is rounded by ε/2 · M at each sum, which makes ε M along each axis, √3
 /// ε M in length. The products add ε times the longest edge, at most the diagonal D of the mesh;
-/// difference to `p`, squares and their sum 5/4 ε times the distance d. Two faces: 2√3 ε M + 2 ε D
-/// + 5/2 ε d. The roundings of v and w move the point along the face, on which the distance is
-/// stationary; it is not for a `p` on the surface to rounding alone, which has no side.
+/// difference to `p`, squares and their sum 5/4 ε times the distance d. For two faces the sum is
+/// 2√3 ε M + 2 ε D + 5/2 ε d. The roundings of v and w move the point along the face, on which the distance is
+/// stationary, except for a `p` on the surface to rounding, which has no side.
 const TIE_COORDINATE: f64 = 4.0 * f64::EPSILON;
 /// The same for the diagonal of the mesh, see [`TIE_COORDINATE`].
 const TIE_DIAGONAL: f64 = 2.0 * f64::EPSILON;
