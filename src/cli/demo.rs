@@ -142,13 +142,17 @@ pub(super) fn demo(arguments: &DemoArguments) -> Result<Losses, CliError> {
     if arguments.web.is_wanted() {
         return demo_on_page(&arguments.web, out, stylus.radius);
     }
+    let (scene, told) = ToldFlags::of_radius(stylus.radius).scene(None)?;
+    let (scan_file, unit) = (out.join("scan.ply"), MeshUnit::Millimetre);
+    let recorded = RecordedAs::default();
+    let files = RefinementFiles::in_folder(&scan_file, unit, out, "touch.mcap", recorded);
     let Refined {
         summary, losses, ..
-    } = refined(out, stylus.radius)?;
+    } = files.refine(scene, told, RefinementOptions::default())?;
     // measures the mesh as written
-    let MeshFile { mesh: refined, .. } = read_mesh(&out.join(MESH), MeshUnit::Millimetre)?;
+    let MeshFile { mesh: refined, .. } = read_mesh(&files.mesh_out, unit)?;
 
-    let named = read_features(&out.join(FEATURES))?.features;
+    let named = read_features(&out.join("features.json"))?.features;
     let found = FoundTable::of(&plate.features(), &named);
     compared(&CompareArguments::in_folder(out, named))?;
 
@@ -172,28 +176,6 @@ pub(super) fn demo(arguments: &DemoArguments) -> Result<Losses, CliError> {
         picture.display()
     ))?;
     Ok(losses)
-}
-
-const MESH: &str = "refined.ply";
-const FEATURES: &str = "features.json";
-
-/// Refines the scan in a folder by the recording in it.
-///
-/// - `tip_radius`: m.
-fn refined(folder: &Path, tip_radius: f64) -> Result<Refined, CliError> {
-    let (scene, told) = ToldFlags::of_radius(tip_radius).scene(None)?;
-    let [scan, recording, mesh_out, features_out, touches_out] =
-        ["scan.ply", "touch.mcap", MESH, FEATURES, "touches.csv"].map(|name| folder.join(name));
-    let files = RefinementFiles {
-        scan: &scan,
-        mesh_unit: MeshUnit::Millimetre,
-        recording: &recording,
-        recorded: &RecordedAs::default(),
-        mesh_out: &mesh_out,
-        features_out: Some(&features_out),
-        touches_out: Some(&touches_out),
-    };
-    files.refine(scene, told, RefinementOptions::default())
 }
 
 impl fmt::Display for DemoSummary {

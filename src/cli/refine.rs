@@ -232,15 +232,17 @@ impl RefineArguments {
     fn refined(&self) -> Result<Refined, CliError> {
         let (scene, told) = self.scene()?;
         self.check_out()?;
-        require(!self.live || scene.patcher_params().is_some(), NO_PATCH)?;
+        // a scene without an update has an error of its own
+        let has_patch = scene.refine.is_none() || scene.patcher_params().is_some();
+        require(has_patch || !self.live, NO_PATCH)?;
         let files = RefinementFiles {
-            scan: &self.scan,
+            scan: self.scan.clone(),
             mesh_unit: self.mesh_unit,
-            recording: &self.bag,
-            recorded: &self.recorded.named(self.stamp),
-            mesh_out: &self.out,
-            features_out: self.features_out.as_deref(),
-            touches_out: self.touches_out.as_deref(),
+            recording: self.bag.clone(),
+            recorded: self.recorded.named(self.stamp),
+            mesh_out: self.out.clone(),
+            features_out: self.features_out.clone(),
+            touches_out: self.touches_out.clone(),
         };
         let options = RefinementOptions {
             is_live: self.live,

@@ -1,7 +1,7 @@
 //! Refinement from files to files, for all refining verbs.
 
 use std::fmt;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use serde::Serialize;
@@ -22,16 +22,16 @@ use crate::scene::{LeftOut, Memory, Scene, SceneCost};
 use crate::session::OutcomePlaces;
 
 /// Input and output files of a refinement.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct RefinementFiles<'a> {
-    pub scan: &'a Path,
+#[derive(Clone, Debug)]
+pub(super) struct RefinementFiles {
+    pub scan: PathBuf,
     /// Unit of the scan and of the refined mesh.
     pub mesh_unit: MeshUnit,
-    pub recording: &'a Path,
-    pub recorded: &'a RecordedAs,
-    pub mesh_out: &'a Path,
-    pub features_out: Option<&'a Path>,
-    pub touches_out: Option<&'a Path>,
+    pub recording: PathBuf,
+    pub recorded: RecordedAs,
+    pub mesh_out: PathBuf,
+    pub features_out: Option<PathBuf>,
+    pub touches_out: Option<PathBuf>,
 }
 
 /// Output of `--json`; times in s.
@@ -58,7 +58,28 @@ pub(super) struct Refined {
     pub losses: Losses,
 }
 
-impl RefinementFiles<'_> {
+impl RefinementFiles {
+    /// Writes refined.ply, features.json and touches.csv into the folder of the recording.
+    ///
+    /// - `recording`: its name in `folder`.
+    pub fn in_folder(
+        scan: &Path,
+        mesh_unit: MeshUnit,
+        folder: &Path,
+        recording: &str,
+        recorded: RecordedAs,
+    ) -> Self {
+        Self {
+            scan: scan.to_owned(),
+            mesh_unit,
+            recording: folder.join(recording),
+            recorded,
+            mesh_out: folder.join("refined.ply"),
+            features_out: Some(folder.join("features.json")),
+            touches_out: Some(folder.join("touches.csv")),
+        }
+    }
+
     /// Reads scan and recording, refines, and writes mesh, features and touches.
     ///
     /// - `told`: sources of the numbers in `scene`.
@@ -77,8 +98,8 @@ impl RefinementFiles<'_> {
             markers,
         } = OpenedInput::open(
             scene,
-            (self.scan, self.mesh_unit),
-            (self.recording, self.recorded),
+            (&self.scan, self.mesh_unit),
+            (&self.recording, &self.recorded),
         )?;
         let mut refinement = Refinement::new(input, recording.wrench_frame, options)?;
         let load_s = started.elapsed().as_secs_f64();
@@ -91,8 +112,8 @@ impl RefinementFiles<'_> {
         let replay_s = started.elapsed().as_secs_f64();
         let stage = WorkProgress::stage("reconstruct");
         let names = InputNames {
-            scan: self.scan,
-            recording: self.recording,
+            scan: &self.scan,
+            recording: &self.recording,
         };
         let RefinedScan {
             mesh,
@@ -104,11 +125,11 @@ impl RefinementFiles<'_> {
             .iter()
             .for_each(|finding| warn!("{finding}"));
         let places = OutcomePlaces {
-            mesh: self.mesh_out,
+            mesh: &self.mesh_out,
             unit: self.mesh_unit,
-            scan: self.scan,
-            features: self.features_out,
-            touches: self.touches_out,
+            scan: &self.scan,
+            features: self.features_out.as_deref(),
+            touches: self.touches_out.as_deref(),
         };
         places.write(mesh)?;
         drop(stage);

@@ -1,7 +1,7 @@
 //! Numbers behind figures and tables as comma-separated values: every number to its last digit,
 //! empty if not finite.
 
-use touchup_page::figure::{Drawing, Figure};
+use touchup_document::figure::{Drawing, Figure};
 
 use super::table::{Table, TableCell};
 

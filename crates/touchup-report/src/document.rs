@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use touchup_page::figure::Figure;
+use touchup_document::figure::Figure;
 
 use super::table::{Chapter, Table};
 

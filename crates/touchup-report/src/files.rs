@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use super::document::Report;
 use super::{csv, page};
-use touchup_page::{ChartSize, Looks, printable};
+use touchup_document::{ChartSize, Looks, printable};
 
 /// Error of writing a report.
 #[derive(Debug, thiserror::Error)]

@@ -26,7 +26,7 @@ pub mod whole_scan;
 pub mod work_precision;
 
 pub use table::{Chapter, Table, TableCell, TableOf};
-pub use touchup_page::figure::{
+pub use touchup_document::figure::{
     Axis, Drawing, Figure, LineStroke, Mark, Panel, Scale, Series, Spread,
 };
 

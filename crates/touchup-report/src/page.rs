@@ -1,8 +1,8 @@
 //! The report as one self-contained page of HTML.
 
 use maud::{Markup, html};
-use touchup_page::number::three_digits;
-use touchup_page::{ChartSize, Looks, document};
+use touchup_document::number::three_digits;
+use touchup_document::{ChartSize, Looks, document};
 
 use super::document::Report;
 use super::table::{Chapter, Table, TableCell};

@@ -1,7 +1,7 @@
 //! Tables and chapters of the report, as data.
 
 use serde::Serialize;
-use touchup_page::figure::{Figure, Spread};
+use touchup_document::figure::{Figure, Spread};
 
 /// One cell of a table.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -11,7 +11,7 @@ use super::stability::{Integrator, Stability};
 use super::whole_scan::{CaseResult, MethodResult, RefineMethod, ScanResult, WholeScan};
 use crate::Table;
 use itertools::Itertools;
-use touchup_page::number::three_digits;
+use touchup_document::number::three_digits;
 
 /// Method and region, step, rate and limits, each with its reason and its cost; `None` if no method
 /// improved any scan.

@@ -231,18 +231,8 @@ impl Probing<'_> {
     /// Makes the mesh of the recording in the folder.
     fn refined(&self, touches: &[TouchLine]) -> Result<Refined, CliError> {
         let (scene, told) = ToldFlags::default().scene(Some(self.scene))?;
-        let [recording, mesh_out, features_out, touches_out] =
-            [RECORDING, "refined.ply", "features.json", "touches.csv"]
-                .map(|name| self.out.join(name));
-        let files = RefinementFiles {
-            scan: self.scan,
-            mesh_unit: self.unit,
-            recording: &recording,
-            recorded: &RecordedFlags::from(probe_topics()).named(StampSource::default()),
-            mesh_out: &mesh_out,
-            features_out: Some(&features_out),
-            touches_out: Some(&touches_out),
-        };
+        let recorded = RecordedFlags::from(probe_topics()).named(StampSource::default());
+        let files = RefinementFiles::in_folder(self.scan, self.unit, self.out, RECORDING, recorded);
         let options = RefinementOptions {
             // an arm without any contact has no measurement that could be wrong: each feature says
             // why

@@ -3,8 +3,8 @@
 use std::io;
 
 use maud::{Markup, html};
-use touchup_page::number::{fixed, signed};
-use touchup_page::{document, picture_address, table};
+use touchup_document::number::{fixed, signed};
+use touchup_document::{document, picture_address, table};
 
 use super::report::{MovedVertices, WhatIfReport};
 use crate::compare::{Displacement, PartView, PicturePanel, PictureParams, Rgb, draw_part};

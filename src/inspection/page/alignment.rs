@@ -1,8 +1,8 @@
 //! The motion between the frames of drawing and part.
 
 use maud::{Markup, html};
-use touchup_page::number::fixed;
-use touchup_page::table;
+use touchup_document::number::fixed;
+use touchup_document::table;
 
 use super::decisions::shown;
 use crate::io::inspection_file::InspectionRecord;

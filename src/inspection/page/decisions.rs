@@ -1,7 +1,7 @@
 //! The table of characteristics with their decisions.
 
 use maud::{Markup, html};
-use touchup_page::number::{fixed, signed};
+use touchup_document::number::{fixed, signed};
 
 use super::tolerance_bar::tolerance_bar;
 use crate::features::InspectedQuantity;

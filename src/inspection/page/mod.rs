@@ -13,7 +13,7 @@ mod touches;
 
 pub(super) use self::input::ReportInput;
 use maud::html;
-use touchup_page::{css_string, document};
+use touchup_document::{css_string, document};
 
 use crate::inspection::InspectionError;
 

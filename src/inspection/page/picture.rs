@@ -5,7 +5,7 @@ use std::path::Path;
 
 use maud::{Markup, html};
 use nalgebra::Point3;
-use touchup_page::picture_address;
+use touchup_document::picture_address;
 
 use super::decisions::{DecisionLook, look_of};
 use super::input::ReportInput;

@@ -1,9 +1,9 @@
 //! Charts of touches: their residuals, and the force of an arm.
 
 use maud::Markup;
-use touchup_page::figure::{Axis, Figure, LineStroke, Mark, Series, Spread};
-use touchup_page::number::range;
-use touchup_page::{ChartSize, Looks};
+use touchup_document::figure::{Axis, Figure, LineStroke, Mark, Series, Spread};
+use touchup_document::number::range;
+use touchup_document::{ChartSize, Looks};
 
 use crate::inspection::evidence::TouchEvidence;
 use crate::io::probed_touches_file::TouchLine;

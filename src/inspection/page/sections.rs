@@ -1,7 +1,7 @@
 //! Head, verdict, form and relations, calibration, files, limits.
 
 use maud::{Markup, html};
-use touchup_page::table;
+use touchup_document::table;
 
 use super::decisions::{in_words, shown};
 use super::input::ReportInput;

@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 use touchup_core::numeric::counted;
-use touchup_page::table;
+use touchup_document::table;
 
 use super::decisions::in_words;
 use super::input::ReportInput;

@@ -1,7 +1,7 @@
 //! The rooms: where a file belongs, and which other rooms it may use.
 
 /// Each room and the rooms it may use; itself always. A room that is missing here fails the check.
-/// The crates of the simulator, of files, of pages and of the report are a room each. Circles
+/// The crates of the simulator, of files, of documents and of the report are a room each. Circles
 /// between crates need no check: cargo refuses them.
 pub const MAY_USE: &[(&str, &str)] = &[
     ("clock", ""),
@@ -50,10 +50,10 @@ pub const MAY_USE: &[(&str, &str)] = &[
         "sweep",
         "stylus mesh features compare sim io threads scan scene replay session refinement",
     ),
-    ("page", ""),
+    ("document", ""),
     (
         "inspection",
-        "page numeric stylus mesh features conformity align compare io scan scene session",
+        "document numeric stylus mesh features conformity align compare io scan scene session",
     ),
     (
         "calibration",
@@ -62,7 +62,7 @@ pub const MAY_USE: &[(&str, &str)] = &[
     ("input_check", "stylus mesh diagnose threads scene replay"),
     (
         "report",
-        "numeric stylus mesh reconstruct haptic live features align sim compare diagnose io scan scene session replay page",
+        "numeric stylus mesh reconstruct haptic live features align sim compare diagnose io scan scene session replay document",
     ),
     (
         "python",
@@ -78,13 +78,13 @@ pub const MAY_USE: &[(&str, &str)] = &[
     (
         "cli",
         "clock numeric stylus mesh reconstruct haptic live features conformity plan arm execute sim align \
-         calibrate compare diagnose io threads scan scene session replay refinement sweep page inspection input_check calibration ros \
+         calibrate compare diagnose io threads scan scene session replay refinement sweep document inspection input_check calibration ros \
          ros2_control ur",
     ),
 ];
 
 /// Same input, same bytes out: nothing of the world outside comes in.
-pub const PURE: &[&str] = &["touchup-core", "touchup-sim", "touchup-page"];
+pub const PURE: &[&str] = &["touchup-core", "touchup-sim", "touchup-document"];
 
 /// The only places with Python.
 pub const MAY_USE_PYTHON: &[&str] = &["src/ur/child/", "crates/touchup-python/"];
@@ -123,7 +123,7 @@ pub const MAY_ASK_THE_SYSTEM: &[&str] = &[
 pub const WHOLE: &[(&str, &str)] = &[
     ("touchup_sim", "sim"),
     ("touchup_io", "io"),
-    ("touchup_page", "page"),
+    ("touchup_document", "document"),
     ("touchup_report", "report"),
     ("touchup_python", "python"),
 ];

@@ -4,7 +4,7 @@ use super::{Convergence, Decay, MeshErrors, OneFaceRun, OneFaceSample, Rule, Swe
 use crate::table::not_run;
 use crate::{Axis, Chapter, Figure, LineStroke, Mark, Series, Table};
 use itertools::Itertools;
-use touchup_page::number::range;
+use touchup_document::number::range;
 
 /// Errors of one face below this value are roundings.
 const DRAWN_FROM: f64 = 1e-12;

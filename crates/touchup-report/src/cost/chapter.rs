@@ -6,7 +6,7 @@ use super::{
 };
 use crate::{Axis, Chapter, Figure, Mark, Series, Spread, Table};
 use itertools::Itertools;
-use touchup_page::number::three_digits;
+use touchup_document::number::three_digits;
 use touchup_sim::wavy::RADIUS;
 
 /// Largest ratio of a time to the law that still counts as the law.

@@ -4,7 +4,7 @@ use super::{Coverage, CoverageKind, HONEST, KindInWorld, SIGMAS_95};
 use crate::table::not_run;
 use crate::{Axis, Chapter, Figure, LineStroke, Mark, Series, Table, TableCell};
 use itertools::Itertools;
-use touchup_page::number::three_digits;
+use touchup_document::number::three_digits;
 use touchup_sim::SimWorld;
 
 /// Marks of a cumulative curve, and its end.

@@ -3,7 +3,7 @@
 use super::{CaseResult, MethodResult, RefineMethod, ScanResult, TouchedError, WholeScan};
 use crate::{Axis, Figure, LineStroke, Mark, Series, Spread, Table};
 use itertools::Itertools;
-use touchup_page::number::range;
+use touchup_document::number::range;
 
 /// Points of a law's curve.
 const STEPS: usize = 12;

@@ -13,7 +13,7 @@ pub use method::{Method, Solved, SolverSetting};
 pub use problem::Problem;
 
 use super::{Effort, Spread, timed};
-use touchup_page::number::three_digits;
+use touchup_document::number::three_digits;
 
 /// The paper's h_min, m.
 pub const PAPER_H_MIN_M: f64 = 0.5e-3;

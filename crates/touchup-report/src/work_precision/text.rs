@@ -3,7 +3,7 @@
 use super::{FaceCase, IntegratorRun, Method, PAPER_H_MIN_M, TILTS_DEG, WorkPrecision};
 use crate::{Axis, Chapter, Figure, Mark, Series, Spread, Table};
 use itertools::Itertools;
-use touchup_page::number::{range, three_digits};
+use touchup_document::number::{range, three_digits};
 
 /// Requested accuracy, m: the resolution of a sensor, a thousandth of that, and nearly exact.
 const LEVELS_M: [(f64, &str); 3] = [(1e-6, "1 µm"), (1e-9, "1 nm"), (1e-12, "1 pm")];

@@ -1,5 +1,4 @@
-//! Figures as SVG, on white. The drawing is our own: plotters (0.3) has no legend beside its frame
-//! and no tooltips of cells.
+//! Figures as SVG, on white.
 
 mod curves;
 mod element;
