@@ -32,6 +32,7 @@ use serde::de::DeserializeOwned;
 use touchup::clock::Clock;
 use touchup::io::mesh_file::{MeshUnit, write_mesh};
 use touchup::live::Quantiles;
+use touchup::node::{INBOX, Node, Prepared, SessionReport};
 use touchup::ros::arguments::NodeConfig;
 use touchup::ros::in_process::OtherParticipants;
 use touchup::ros::inbox::inbox;
@@ -39,7 +40,6 @@ use touchup::ros::messages::{
     HapticMismatch, Header, Point, Pose, PoseStamped, Quaternion, Time, Vector3, Wrench,
     WrenchStamped,
 };
-use touchup::ros::node::{INBOX, Node, Prepared, SessionReport};
 use touchup::ros::parameters::{ParameterValue, Parameters};
 use touchup::ros::port::{Arrival, Publication};
 use touchup::ros::{dds, in_process};
@@ -192,7 +192,7 @@ fn slid_over(node: Node, world: &OtherParticipants) -> SessionReport {
 #[cfg(feature = "web")]
 #[expect(clippy::too_many_lines)]
 fn beside_pages(faces: usize, turns: usize) {
-    use touchup::ros::web::{NodeFacts, WebParams, WebServer};
+    use touchup::page::{NodeFacts, WebParams, WebServer};
     let kinds = ["no page", "a page that reads", "a page that never reads"];
     let mut p99 = kinds.map(|_| Vec::new());
     for turn in 0..turns {

@@ -9,7 +9,10 @@
 //!
 //! | crate | modules |
 //! |---|---|
-//! | [`touchup_core`] | the method: [`stylus`] [`mesh`] [`reconstruct`] [`haptic`] [`features`] [`conformity`] [`align`] [`compare`] [`calibrate`] [`diagnose`] [`probing::plan`] [`probing::arm`] [`probing::execute`]; frames and units |
+//! | [`touchup_geometry`] | [`mesh`] [`form`]; units |
+//! | [`touchup_method`] | samples to mesh: [`stylus`] [`reconstruct`] [`haptic`]; frames |
+//! | [`touchup_features`] | [`features`] [`conformity`] [`align`] [`compare`] [`calibrate`] [`diagnose`] |
+//! | [`touchup_probing`] | [`probing::plan`] [`probing::arm`] [`probing::execute`] |
 //! | [`touchup_sim`] | [`sim`]: known surfaces, a scanner, a stylus and an arm to test against |
 //! | [`touchup_io`] | [`io`]: mesh files, recordings, tables, pictures |
 //! | [`touchup_session`] | [`clock`], [`threads`], [`scan`], [`scene`], [`replay`], [`refinement`], [`calibration`], [`input_check`], [`live`], [`session`], [`sweep`] |
@@ -22,36 +25,17 @@
 #[doc = include_str!("../docs/method.md")]
 struct MethodPage;
 
-pub use touchup_core::{
-    align, calibrate, compare, conformity, diagnose, features, form, haptic, mesh, probing,
-    reconstruct, stylus,
-};
+pub use touchup_features::{align, calibrate, compare, conformity, diagnose, features};
+pub use touchup_geometry::{form, mesh};
+pub use touchup_method::{haptic, reconstruct, stylus};
+pub use touchup_node::*;
+pub use touchup_probing as probing;
 pub use touchup_session::{
     calibration, clock, input_check, live, refinement, replay, scan, scene, session, sweep, threads,
 };
 pub use {touchup_io as io, touchup_sim as sim};
 
 pub mod cli;
-mod inspection;
-pub mod log_lines;
-#[cfg(any(feature = "ros", feature = "r2r"))]
-pub mod ros;
-#[cfg(any(feature = "ros", feature = "r2r"))]
-pub mod ros2_control;
-#[cfg(feature = "ur")]
-pub mod ur;
-
-/// Optional cargo features, and whether this build has them.
-pub const FEATURES: [(&str, bool); 4] = [
-    ("feature ros", cfg!(feature = "ros")),
-    ("feature r2r", cfg!(feature = "r2r")),
-    ("feature ur", cfg!(feature = "ur")),
-    ("feature web", cfg!(feature = "web")),
-];
-
-// the stand-in supplies the model of a UR's controller and uses this crate by its name
-#[cfg(all(test, feature = "ur"))]
-extern crate self as touchup;
 
 #[cfg(test)]
 #[path = "../tests/common/colour_vision.rs"]

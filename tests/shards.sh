@@ -146,7 +146,7 @@ shard_11() {
 # the client in the interpreter beside it, against a controller that fails; unit tests, and rooms of many property tests
 shard_12() {
   title "Faults of a UR arm"
-  slow_rust 'package(touchup) | package(/^touchup-(core|io|session|sim)$/) | binary(ur) | (binary(rooms) & test(/^(mesh|scene|sim|stylus)::/))'
+  slow_rust 'package(touchup) | package(/^touchup-(geometry|method|features|probing|io|session|sim|inspect|node)$/) | binary(ur) | (binary(rooms) & test(/^(mesh|scene|sim|stylus)::/))'
   markdown scripted::faults::each_fault_alone_ends_as_it_should "Faults of the arm"
   markdown scripted::faults::random_scripts_end_as_they_should "Faults at random"
   markdown scripted::hours::hours_of_faults_and_recoveries_leave_no_stuck_state_and_no_memory_behind "Hours of faults at the arm"
@@ -174,8 +174,8 @@ shard_14() {
 # of the node on r2r what it adds, as far as it goes where no ROS is installed; and the library without features
 shard_15() {
   title "Other builds"
-  checked "lint of r2r" cargo clippy --lib --no-default-features --features r2r-check -- -D warnings
-  stage "tests of r2r" rust_tests r2r --package touchup --lib --no-default-features --features r2r-check --filterset 'test(/r2r/)'
+  checked "lint of r2r" cargo clippy --package touchup-node --lib --features r2r-check -- -D warnings
+  stage "tests of r2r" rust_tests r2r --package touchup-node --lib --features r2r-check --filterset 'test(/r2r/)'
   checked "without features" cargo check --lib --no-default-features
   checked "lint of the wheel" cargo clippy --package touchup-python --features abi3 -- -D warnings
 }

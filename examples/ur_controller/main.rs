@@ -32,8 +32,8 @@ use std::time::{Duration, Instant};
 
 use anyhow::Context;
 use nalgebra::{Point3, Vector3};
-use touchup::sim::{ArmParams, MeshSurface, Plate, WEIGHTLESS};
-use touchup::stylus::Payload;
+use touchup_method::stylus::Payload;
+use touchup_sim::{ArmParams, MeshSurface, Plate, WEIGHTLESS};
 
 use model::body::{Body, PERIOD};
 use model::controller::Controller;

@@ -7,10 +7,10 @@ use std::path::Path;
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use rusqlite::{Connection, params};
-use touchup_core::stylus::{
+use touchup_io::recording::{Record, RecordingWriter, Topics};
+use touchup_method::stylus::{
     MarkerFrame, MarkerObservation, Message, StampedPose, StampedWrench, Wrench,
 };
-use touchup_io::recording::{Record, RecordingWriter, Topics};
 use touchup_session::scene::Scene;
 
 /// Topic of the markers.

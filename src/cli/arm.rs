@@ -9,23 +9,23 @@ use super::arm_errors::ArmErrorsName;
 use super::probing::{KeptMeasurements, Ready, SpotWorld, millimetres};
 use super::progress::WorkProgress;
 use super::signals::StopSignals;
-use crate::calibrate::ReferenceSphere;
-use crate::io::mesh_file::MeshUnit;
-use crate::mesh::TriMesh;
-use crate::probing::arm::Arm;
-use crate::probing::execute::{Cell, Prober};
+use touchup_features::calibrate::ReferenceSphere;
+use touchup_geometry::mesh::TriMesh;
+use touchup_io::mesh_file::MeshUnit;
+use touchup_method::stylus::Payload;
 #[cfg(any(feature = "ros", feature = "r2r"))]
-use crate::ros::arguments::NodeConfig;
+use touchup_node::ros::arguments::NodeConfig;
 #[cfg(any(feature = "ros", feature = "r2r"))]
-use crate::ros2_control::{ArmTopics, Ros2ControlArm, Ros2ControlParams};
-use crate::scan::read_scan;
+use touchup_node::ros2_control::{ArmTopics, Ros2ControlArm, Ros2ControlParams};
 #[cfg(feature = "ur")]
-use crate::scene::RobotSection;
-use crate::scene::Scene;
-use crate::sim::{ArmParams, MeshSurface, SimArm, WEIGHTLESS, WithSpheres};
-use crate::stylus::Payload;
+use touchup_node::ur::{UrArm, UrParams};
+use touchup_probing::arm::Arm;
+use touchup_probing::execute::{Cell, Prober};
+use touchup_session::scan::read_scan;
 #[cfg(feature = "ur")]
-use crate::ur::{UrArm, UrParams};
+use touchup_session::scene::RobotSection;
+use touchup_session::scene::Scene;
+use touchup_sim::{ArmParams, MeshSurface, SimArm, WEIGHTLESS, WithSpheres};
 
 /// Kind of arm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -169,8 +169,8 @@ pub(super) fn ros2_control_arm(
         wrench,
         trajectory,
     } = &params.topics;
-    let port =
-        crate::ros::arm_port(config, [joint_states, wrench], trajectory).map_err(CliError::arm)?;
+    let port = touchup_node::ros::arm_port(config, [joint_states, wrench], trajectory)
+        .map_err(CliError::arm)?;
     Ok(Box::new(
         Ros2ControlArm::connect(&params, port).map_err(CliError::arm)?,
     ))

@@ -3,7 +3,7 @@
 use clap::ValueEnum;
 use nalgebra::{Point3, Vector3};
 
-use crate::sim::{ArmErrorSigmas, ArmErrors, ArmFault, SimArm};
+use touchup_sim::{ArmErrorSigmas, ArmErrors, ArmFault, SimArm};
 
 /// Error model of a simulated arm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

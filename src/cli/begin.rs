@@ -1,7 +1,7 @@
 //! Start-up errors of the node that an operator can mend.
 
 use super::CliError;
-use crate::ros::node::NodeError;
+use touchup_node::node::NodeError;
 
 /// Start-up error of the node.
 #[derive(Debug)]

@@ -15,15 +15,15 @@ pub use self::table::comparison_json;
 use super::pictures::{file_name, today, view_from, write_coloured, write_picture};
 use super::progress::WorkProgress;
 use super::{CliError, Losses, check_outputs, print_report, require};
-use crate::compare::{
+use touchup_features::compare::{
     CompareParams, Comparison, IndexedMesh, PictureLabel, PicturePanel, PictureParams, Regions,
     SupportRegion, UnlikeExtents, colour_of, compare as compare_shapes,
 };
-use crate::io::features_file::{FeatureRecord, read_features};
-use crate::io::mesh_file::{MeshUnit, VertexColumn, read_vertex_columns};
-use crate::mesh::{FaceTree, TriMesh};
-use crate::scan::{Scan, read_scan};
-use crate::threads::Threads;
+use touchup_geometry::mesh::{FaceTree, TriMesh};
+use touchup_io::features_file::{FeatureRecord, read_features};
+use touchup_io::mesh_file::{MeshUnit, VertexColumn, read_vertex_columns};
+use touchup_session::scan::{Scan, read_scan};
+use touchup_session::threads::Threads;
 
 /// Tolerance in the picture of a folder, mm: medium of ISO 2768-1 for lengths of up to 6 mm.
 const TOLERANCE_MM: f64 = 0.1;

@@ -10,10 +10,12 @@ use serde::Serialize;
 use super::progress::WorkProgress;
 use super::recorded::RecordedFlags;
 use super::{CliError, Losses, check_kept, check_outputs, check_place, counted, print_report};
-use crate::io::features_file::read_features;
-use crate::io::recording::{CopiedRecording, RecordingReader, StampSource, Topics, copy_recording};
-use crate::io::result_table::{ResultTable, is_table};
-use crate::scene::Scene;
+use touchup_io::features_file::read_features;
+use touchup_io::recording::{
+    CopiedRecording, RecordingReader, StampSource, Topics, copy_recording,
+};
+use touchup_io::result_table::{ResultTable, is_table};
+use touchup_session::scene::Scene;
 
 #[derive(Debug, Args)]
 pub(super) struct ConvertArguments {

@@ -13,6 +13,8 @@ use super::compare::{CompareArguments, compared};
 use super::demo_robot::demo_robot;
 use super::found::FoundTable;
 #[cfg(any(feature = "ros", feature = "r2r"))]
+use super::node::end_text;
+#[cfg(any(feature = "ros", feature = "r2r"))]
 use super::page::{on_page, parameters_of};
 use super::progress::WorkProgress;
 use super::refinement::{RefineSummary, Refined, RefinementFiles};
@@ -21,21 +23,19 @@ use super::told::ToldFlags;
 #[cfg(any(feature = "ros", feature = "r2r"))]
 use super::web::WebFlags;
 use super::{CliError, Losses, print_result, reported, write_json};
-use crate::compare::TouchedRegion;
-use crate::io::features_file::read_features;
-use crate::io::mesh_file::{MeshFile, MeshUnit, read_mesh};
+use touchup_features::compare::TouchedRegion;
+use touchup_geometry::mesh::{FaceTree, MeshError, TriMesh};
+use touchup_io::features_file::read_features;
+use touchup_io::mesh_file::{MeshFile, MeshUnit, read_mesh};
 #[cfg(any(feature = "ros", feature = "r2r"))]
-use crate::io::recording::{StampSource, Topics};
-use crate::mesh::{FaceTree, MeshError, TriMesh};
-use crate::refinement::RefinementOptions;
-use crate::replay::RecordedAs;
+use touchup_io::recording::{StampSource, Topics};
 #[cfg(any(feature = "ros", feature = "r2r"))]
-use crate::replay::Recording;
+use touchup_node::ros::parameters::ParameterValue;
+use touchup_session::refinement::RefinementOptions;
+use touchup_session::replay::RecordedAs;
 #[cfg(any(feature = "ros", feature = "r2r"))]
-use crate::ros::node::NodeEnd;
-#[cfg(any(feature = "ros", feature = "r2r"))]
-use crate::ros::parameters::ParameterValue;
-use crate::sim::{
+use touchup_session::replay::Recording;
+use touchup_sim::{
     PathParams, Plate, ScanQuality, ScannerParams, StylusParams, Surface, measure_quality,
     plan_demo,
 };
@@ -105,11 +105,8 @@ fn demo_on_page(web: &WebFlags, out: &Path, tip_radius: f64) -> Result<Losses, C
     )?;
     // with the true plate the page can show the error of the scan
     let web = web.with_nominal(out.join("truth.ply"));
-    let NodeEnd { folder, report } = on_page(&web, parameters, recording, None)?;
-    print_result(&format!(
-        "{report}\nwrote {}",
-        folder.join("refined.ply").display()
-    ))?;
+    let end = on_page(&web, parameters, recording, None)?;
+    print_result(&end_text(&end))?;
     Ok(Losses::new())
 }
 

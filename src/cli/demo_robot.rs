@@ -18,14 +18,14 @@ use super::probing::{Done, Probing, ProbingSummary, Ready};
 use super::progress::WorkProgress;
 use super::signals::StopSignals;
 use super::{CliError, Losses, not_written, print_result, reported, write_json};
-use crate::calibrate::ReferenceSphere;
-use crate::features::{Feature, InspectedQuantity};
-use crate::io::atomic::{create_folder, write_atomically};
-use crate::io::features_file::FeatureRecord;
-use crate::io::mesh_file::{MeshUnit, write_mesh};
-use crate::probing::arm::Arm;
-use crate::probing::execute::{Flag, Probed, Prober};
-use crate::sim::{Plate, ScannerParams, SimArm, TruthFeature, TruthShape, WithSpheres, scan};
+use touchup_features::calibrate::ReferenceSphere;
+use touchup_features::features::{Feature, InspectedQuantity};
+use touchup_io::atomic::{create_folder, write_atomically};
+use touchup_io::features_file::FeatureRecord;
+use touchup_io::mesh_file::{MeshUnit, write_mesh};
+use touchup_probing::arm::Arm;
+use touchup_probing::execute::{Flag, Probed, Prober};
+use touchup_sim::{Plate, ScannerParams, SimArm, TruthFeature, TruthShape, WithSpheres, scan};
 
 /// Scene of the demo, written beside the other files.
 const SCENE: &str = include_str!("../../config/probe.yaml");

@@ -10,15 +10,15 @@ use nalgebra::Vector3;
 use super::pictures::{file_name, today, view_from, write_coloured, write_picture};
 use super::progress::WorkProgress;
 use super::{CliError, Losses, check_outputs, counted, print_report, reported};
-use crate::compare::{
+use touchup_features::compare::{
     BadTouches, Class, Disagreement, DisagreementRegion, IndexedMesh, PicturePanel, PictureParams,
     RefinedShape, RigidOffset, Scanner, VertexBasis, colour_of_class, disagreement,
 };
-use crate::io::mesh_file::{MeshUnit, VertexColumn, read_vertex_columns};
-use crate::io::touches_file::read_touches;
-use crate::mesh::{FaceTree, TriMesh};
-use crate::scan::read_scan;
-use crate::threads::Threads;
+use touchup_geometry::mesh::{FaceTree, TriMesh};
+use touchup_io::mesh_file::{MeshUnit, VertexColumn, read_vertex_columns};
+use touchup_io::touches_file::read_touches;
+use touchup_session::scan::read_scan;
+use touchup_session::threads::Threads;
 
 #[derive(Debug, Args)]
 pub(super) struct DisagreeArguments {

@@ -10,13 +10,13 @@ use super::progress::WorkProgress;
 use super::recorded::RecordedFlags;
 use super::told::{ToldFlags, ToldNumbers};
 use super::{CliError, Losses, print_report};
-use crate::diagnose::InputFinding;
-use crate::input_check::{InputCheck, check_input};
-use crate::io::mesh_file::MeshUnit;
-use crate::io::recording::StampSource;
-use crate::refinement::{InputNames, WrenchOffset, refuse_unsound};
-use crate::replay::{Recording, marker_filter};
-use crate::scan::read_scan;
+use touchup_features::diagnose::InputFinding;
+use touchup_io::mesh_file::MeshUnit;
+use touchup_io::recording::StampSource;
+use touchup_session::input_check::{InputCheck, check_input};
+use touchup_session::refinement::{InputNames, WrenchOffset, refuse_unsound};
+use touchup_session::replay::{Recording, marker_filter};
+use touchup_session::scan::read_scan;
 
 #[derive(Debug, Args)]
 pub(super) struct DoctorArguments {

@@ -10,25 +10,25 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use crate::calibration::CalibrationError;
-use crate::io::features_file::FeaturesFileError;
-use crate::io::file_error::FileError;
-use crate::io::mesh_file::MeshFileError;
-use crate::io::nominal_file::NominalFileError;
-use crate::io::recording::RecordingError;
-use crate::io::result_table::ResultTableError;
-use crate::io::touches_file::TouchesFileError;
-use crate::probing::execute::{Ending, PayloadProbeError, SpotError};
-use crate::probing::plan::ExploreError;
-use crate::refinement::RefinementError;
-use crate::replay::ReplayError;
+use touchup_io::features_file::FeaturesFileError;
+use touchup_io::file_error::FileError;
+use touchup_io::mesh_file::MeshFileError;
+use touchup_io::nominal_file::NominalFileError;
+use touchup_io::recording::RecordingError;
+use touchup_io::result_table::ResultTableError;
+use touchup_io::touches_file::TouchesFileError;
 #[cfg(any(feature = "ros", feature = "r2r"))]
-use crate::ros::node::NodeError;
-use crate::scan::ScanError;
-use crate::scene::SceneError;
-use crate::session::OutcomeError;
-use crate::sim::SimError;
-use crate::sweep::{SweepError, WhatIfError};
+use touchup_node::node::NodeError;
+use touchup_probing::execute::{Ending, PayloadProbeError, SpotError};
+use touchup_probing::plan::ExploreError;
+use touchup_session::calibration::CalibrationError;
+use touchup_session::refinement::RefinementError;
+use touchup_session::replay::ReplayError;
+use touchup_session::scan::ScanError;
+use touchup_session::scene::SceneError;
+use touchup_session::session::OutcomeError;
+use touchup_session::sweep::{SweepError, WhatIfError};
+use touchup_sim::SimError;
 
 /// Losses of completed work; empty: none.
 pub(super) type Losses = Vec<String>;
@@ -235,18 +235,18 @@ macro_rules! errors_of_rooms {
 errors_of_rooms! {
     SceneError => |error| if matches!(error, SceneError::NoRadius) { ("usage", 2) } else { ("scene", 3) }, "";
     // settings come from a scene file: flags are checked before
-    crate::stylus::SettingError => |_| ("scene", 3), "";
+    touchup_method::stylus::SettingError => |_| ("scene", 3), "";
     MeshFileError => |error| match error {
         MeshFileError::File(FileError::Write { .. }) => NOT_WRITTEN,
         _ => ("mesh", 3),
     }, "";
     ScanError => |_| ("mesh", 3), "";
-    crate::mesh::MeshError => |_| ("mesh", 3), "";
+    touchup_geometry::mesh::MeshError => |_| ("mesh", 3), "";
     RecordingError => |error| match error {
         RecordingError::Write(_) | RecordingError::NotWritten(_) => NOT_WRITTEN,
         _ => ("recording", 3),
     }, "";
-    crate::session::SessionError => |_| ("session", 3), "";
+    touchup_session::session::SessionError => |_| ("session", 3), "";
     TouchesFileError => |error| match error {
         TouchesFileError::File(FileError::Write { .. }) => NOT_WRITTEN,
         _ => ("touches", 3),
@@ -270,19 +270,19 @@ errors_of_rooms! {
         SimError::BadParameter { .. } | SimError::TooFine { .. } | SimError::TooCoarse { .. } => ("simulation", 2),
         _ => ("simulation", 3),
     }, "";
-    crate::haptic::RefineError => |_| ("refinement", 3), "the scan cannot be refined: ";
-    crate::live::LiveError => |_| ("refinement", 3), "";
-    crate::io::table::TableError => |_| ("calibration", 3), "";
-    crate::align::IcpError => |_| ("alignment", 3), "the mesh cannot be aligned with the truth: ";
-    crate::align::FeaturesError => |_| ("alignment", 3), "";
-    crate::compare::CompareError => |_| ("comparison", 3), "the two cannot be compared: ";
+    touchup_method::haptic::RefineError => |_| ("refinement", 3), "the scan cannot be refined: ";
+    touchup_session::live::LiveError => |_| ("refinement", 3), "";
+    touchup_io::table::TableError => |_| ("calibration", 3), "";
+    touchup_features::align::IcpError => |_| ("alignment", 3), "the mesh cannot be aligned with the truth: ";
+    touchup_features::align::FeaturesError => |_| ("alignment", 3), "";
+    touchup_features::compare::CompareError => |_| ("comparison", 3), "the two cannot be compared: ";
     io::Error => |_| NOT_WRITTEN, "cannot read stdin or write stdout: ";
 }
 
 #[cfg(any(feature = "ros", feature = "r2r"))]
 errors_of_rooms! {
-    crate::ros::arguments::ArgumentError => |_| ("usage", 2), "";
-    crate::ros::RosError => |_| ("ros", 1), "";
+    touchup_node::ros::arguments::ArgumentError => |_| ("usage", 2), "";
+    touchup_node::ros::RosError => |_| ("ros", 1), "";
     NodeError => |error| match error {
         NodeError::NoScan | NodeError::RegionWithRobot => ("node", 2),
         NodeError::Scene(error) if matches!(**error, SceneError::NoRadius) => ("usage", 2),
@@ -294,16 +294,16 @@ errors_of_rooms! {
 
 #[cfg(feature = "web")]
 errors_of_rooms! {
-    crate::ros::web::WebError => |error| match error {
-        crate::ros::web::WebError::Certificate { .. } | crate::ros::web::WebError::Setup(_) => ("web", 3),
+    touchup_node::page::WebError => |error| match error {
+        touchup_node::page::WebError::Certificate { .. } | touchup_node::page::WebError::Setup(_) => ("web", 3),
         _ => ("web", 1),
     }, "";
 }
 
 #[cfg(feature = "ur")]
 errors_of_rooms! {
-    crate::ur::SetupError => |_| ("arm", 1), "";
-    crate::ur::child::ChildError => |_| ("arm", 1), "";
+    touchup_node::ur::SetupError => |_| ("arm", 1), "";
+    touchup_node::ur::child::ChildError => |_| ("arm", 1), "";
 }
 
 impl From<SpotError> for CliError {

@@ -8,16 +8,18 @@ use clap::{Args, ValueEnum};
 
 use super::progress::WorkProgress;
 use super::{CliError, Losses, check_kept, counted, print_report, require};
-use crate::features::clusters::{Cluster, ClusterParams, PaperParams, clusters, paper_clusters};
-use crate::features::curvature::curvature;
-use crate::features::{Detection, Feature, FittedTo, Form, Kind, Measured};
-use crate::io::features_file::FeatureFile;
-use crate::io::mesh_file::MeshUnit;
-use crate::io::result_table::write_features_as_named;
-use crate::io::touches_file::read_touches;
-use crate::mesh::TriMesh;
-use crate::scan::{Scan, read_scan};
-use crate::session::found;
+use touchup_features::features::clusters::{
+    Cluster, ClusterParams, PaperParams, clusters, paper_clusters,
+};
+use touchup_features::features::curvature::curvature;
+use touchup_features::features::{Detection, Feature, FittedTo, Form, Kind, Measured};
+use touchup_geometry::mesh::TriMesh;
+use touchup_io::features_file::FeatureFile;
+use touchup_io::mesh_file::MeshUnit;
+use touchup_io::result_table::write_features_as_named;
+use touchup_io::touches_file::read_touches;
+use touchup_session::scan::{Scan, read_scan};
+use touchup_session::session::found;
 
 #[derive(Debug, Args)]
 pub(super) struct FeaturesArguments {

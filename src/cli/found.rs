@@ -6,9 +6,9 @@ use nalgebra::{Point3, Vector3};
 use serde::Serialize;
 
 use super::reported;
-use crate::features::InspectedQuantity;
-use crate::io::features_file::FeatureRecord;
-use crate::sim::TruthFeature;
+use touchup_features::features::InspectedQuantity;
+use touchup_io::features_file::FeatureRecord;
+use touchup_sim::TruthFeature;
 
 reported! {
     /// True feature and its detection; lengths in mm, angles in degrees.

@@ -6,9 +6,9 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::{CliError, Losses, check_place, not_written, print_result, require};
-use crate::io::atomic::write_atomically;
-use crate::io::mesh_file::MeshUnit;
-use crate::scene::{Scene, Setting};
+use touchup_io::atomic::write_atomically;
+use touchup_io::mesh_file::MeshUnit;
+use touchup_session::scene::{Scene, Setting};
 
 #[derive(Debug, Args)]
 pub(super) struct InitArguments {

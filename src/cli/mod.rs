@@ -71,16 +71,16 @@ use std::io::{ErrorKind, stdin, stdout};
 use std::process::ExitCode;
 
 use clap::{CommandFactory, Parser, Subcommand};
-use touchup_core::numeric::counted;
+use touchup_geometry::numeric::counted;
 use touchup_session::reported;
 use tracing_subscriber::filter::{LevelFilter, Targets};
 
 #[cfg(any(feature = "ros", feature = "r2r"))]
-use crate::ros::arguments::{log_level, split};
+use touchup_node::ros::arguments::{log_level, split};
 
 /// Repairs a 3D scan by touch.
 #[derive(Debug, Parser)]
-#[command(name = "touchup", version = crate::io::machine::VERSION, after_help = EXIT_CODES)]
+#[command(name = "touchup", version = touchup_io::machine::VERSION, after_help = EXIT_CODES)]
 struct Arguments {
     #[command(subcommand)]
     verb: Verb,

@@ -1,6 +1,5 @@
 //! `touchup node`: the ROS 2 node, until a signal ends it.
 
-use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -15,19 +14,19 @@ use super::web::WebFlags;
 use super::{
     CliError, Losses, by_reason, counted, print_report, print_result, require, require_positive,
 };
-use crate::clock::Clock;
-use crate::live::Quantiles;
-use crate::mesh::TriMesh;
-use crate::ros;
-use crate::ros::arguments::NodeConfig;
-use crate::ros::inbox::{Arrivals, Inbox, inbox};
-use crate::ros::node::{
+use touchup_geometry::mesh::TriMesh;
+use touchup_node::node::{
     ArmKind, ArmOfNode, INBOX, NodeEnd, NodeError, Prepared, SessionReport, mesh_unit,
 };
-use crate::ros::parameters::ParameterValue;
-use crate::ros::port::Port;
-use crate::scan::{Scan, read_scan};
-use crate::scene::Scene;
+use touchup_node::ros;
+use touchup_node::ros::arguments::NodeConfig;
+use touchup_node::ros::inbox::{Arrivals, Inbox, inbox};
+use touchup_node::ros::parameters::ParameterValue;
+use touchup_node::ros::port::Port;
+use touchup_session::clock::Clock;
+use touchup_session::live::Quantiles;
+use touchup_session::scan::{Scan, read_scan};
+use touchup_session::scene::Scene;
 
 #[derive(Debug, Args)]
 pub(super) struct NodeArguments {
@@ -91,11 +90,9 @@ pub(super) fn node(arguments: &NodeArguments, ros: &[String]) -> Result<Losses, 
         config.place.full_name(),
         topics.join(" and ")
     ))?;
-    let NodeEnd { folder, report } = running.join()?;
-    print_report(arguments.json, &report, || {
-        format!("{report}\nwrote {}", folder.join("refined.ply").display())
-    })?;
-    Ok(losses(&report))
+    let end = running.join()?;
+    print_report(arguments.json, &end.report, || end_text(&end))?;
+    Ok(losses(&end.report))
 }
 
 /// Node with its network and its arm.
@@ -234,46 +231,45 @@ fn losses(report: &SessionReport) -> Losses {
         .collect()
 }
 
-impl fmt::Display for SessionReport {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let wrenches = counted(self.lost[0], "wrench", "wrenches");
-        let poses = counted(self.lost[1], "pose", "poses");
-        let [poses_stale, wrenches_stale] = self.gaps.map(|gaps| counted(gaps, "time", "times"));
-        writeln!(
-            f,
+/// The end of a node as text: the report of its session, and the file of the mesh.
+pub(super) fn end_text(NodeEnd { folder, report }: &NodeEnd) -> String {
+    format!(
+        "{}\nwrote {}",
+        report_text(report),
+        folder.join("refined.ply").display()
+    )
+}
+
+/// The report of a session as text.
+fn report_text(report: &SessionReport) -> String {
+    let wrenches = counted(report.lost[0], "wrench", "wrenches");
+    let poses = counted(report.lost[1], "pose", "poses");
+    let [poses_stale, wrenches_stale] = report.gaps.map(|gaps| counted(gaps, "time", "times"));
+    let us = |ns: u64| ns as f64 * 1e-3;
+    let line = |times: Quantiles| {
+        let [median, p99, p999, max] = [times.median, times.p99, times.p999, times.max].map(us);
+        format!("median {median:.1} us, p99 {p99:.1} us, p99.9 {p999:.1} us, max {max:.1} us")
+    };
+    let mut lines = vec![
+        format!(
             "samples: {} accepted; refused: {}",
-            self.accepted,
-            by_reason(&self.refused)
-        )?;
-        writeln!(
-            f,
+            report.accepted,
+            by_reason(&report.refused)
+        ),
+        format!(
             "lost in transport: {wrenches}, {poses}; streams stale: {wrenches_stale} wrenches, {poses_stale} poses"
-        )?;
-        writeln!(
-            f,
+        ),
+        format!(
             "contacts: {}; updates cut back: {}",
-            self.contacts, self.cut_back
-        )?;
-        let us = |ns: u64| ns as f64 * 1e-3;
-        let line = |Quantiles {
-                        median,
-                        p99,
-                        p999,
-                        max,
-                    }: Quantiles| {
-            let [median, p99, p999, max] = [median, p99, p999, max].map(us);
-            format!("median {median:.1} us, p99 {p99:.1} us, p99.9 {p999:.1} us, max {max:.1} us")
-        };
-        write!(
-            f,
-            "push: {}\narrival to mesh: {}",
-            line(self.push_ns),
-            line(self.latency_ns)
-        )?;
-        let patch = self
-            .result
-            .as_ref()
-            .and_then(|result| result.patch.as_ref());
-        patch.iter().try_for_each(|patch| write!(f, "\n{patch}"))
-    }
+            report.contacts, report.cut_back
+        ),
+        format!("push: {}", line(report.push_ns)),
+        format!("arrival to mesh: {}", line(report.latency_ns)),
+    ];
+    let patch = report
+        .result
+        .as_ref()
+        .and_then(|result| result.patch.as_ref());
+    lines.extend(patch.map(ToString::to_string));
+    lines.join("\n")
 }

@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use super::error::{CliError, require};
-use crate::io::atomic::{AtomicFile, is_same_file, write_atomically};
-use crate::io::file_error::FileError;
+use touchup_io::atomic::{AtomicFile, is_same_file, write_atomically};
+use touchup_io::file_error::FileError;
 
 /// Prints one or more lines on stdout, whole, or returns an error; a closed pipe is none.
 pub(super) fn print_result(text: &str) -> Result<(), CliError> {

@@ -9,14 +9,14 @@ use super::replay::play;
 use super::signals::SignalledNode;
 use super::web::WebFlags;
 use super::{CliError, notify};
-use crate::clock::Clock;
-use crate::io::mesh_file::MeshUnit;
-use crate::replay::Recording;
-use crate::ros::in_process;
-use crate::ros::inbox::inbox;
-use crate::ros::node::{INBOX, NodeEnd, NodeError, Prepared};
-use crate::ros::parameters::{ParameterValue, Parameters};
-use crate::stylus::MarkerFilter;
+use touchup_io::mesh_file::MeshUnit;
+use touchup_method::stylus::MarkerFilter;
+use touchup_node::node::{INBOX, NodeEnd, NodeError, Prepared};
+use touchup_node::ros::in_process;
+use touchup_node::ros::inbox::inbox;
+use touchup_node::ros::parameters::{ParameterValue, Parameters};
+use touchup_session::clock::Clock;
+use touchup_session::replay::Recording;
 
 /// Polling period for an open page.
 const LOOK: Duration = Duration::from_millis(100);

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::CliError;
-use crate::ros::parameters::ParameterValue;
+use touchup_node::ros::parameters::ParameterValue;
 
 /// Path as a parameter.
 pub(super) fn path(path: &Path) -> Result<ParameterValue, CliError> {

@@ -8,10 +8,10 @@ use nalgebra::Vector3;
 
 use super::error::{CliError, require};
 use super::output::not_written;
-use crate::compare::{PicturePanel, PictureParams, Rgb, draw_picture};
-use crate::io::mesh_file::{MeshUnit, VertexColumn, write_mesh_with};
-use crate::io::png::write_png;
-use crate::mesh::TriMesh;
+use touchup_features::compare::{PicturePanel, PictureParams, Rgb, draw_picture};
+use touchup_geometry::mesh::TriMesh;
+use touchup_io::mesh_file::{MeshUnit, VertexColumn, write_mesh_with};
+use touchup_io::png::write_png;
 
 /// Date of the system clock (UTC), for pictures.
 pub(super) fn today() -> String {

@@ -12,9 +12,9 @@ use super::probing::{Done, Probing, Ready, flag_of, goals_of, millimetres};
 use super::signals::StopSignals;
 use super::told::ToldNumbers;
 use super::{CliError, Losses, counted, print_report, reported, require, require_positive};
-use crate::conformity::DecisionParams;
-use crate::probing::arm::{Arm, Narrower};
-use crate::probing::execute::{Flag, HeldBack, Plan, PlannedMotion};
+use touchup_features::conformity::DecisionParams;
+use touchup_probing::arm::{Arm, Narrower};
+use touchup_probing::execute::{Flag, HeldBack, Plan, PlannedMotion};
 
 #[derive(Debug, Args)]
 pub(super) struct ProbeArguments {
@@ -356,8 +356,8 @@ mod tests {
     use nalgebra::{Point3, Vector3};
 
     use super::*;
-    use crate::probing::plan::TouchPlan;
-    use crate::scene::Scene;
+    use touchup_probing::plan::TouchPlan;
+    use touchup_session::scene::Scene;
 
     #[test]
     fn a_slide_that_cannot_be_made_is_no_touch() {

@@ -2,9 +2,9 @@
 
 use clap::Args;
 
-use crate::io::recording::{RecordingLayout, StampSource, Topics};
-use crate::replay::RecordedAs;
-use crate::scene::Scene;
+use touchup_io::recording::{RecordingLayout, StampSource, Topics};
+use touchup_session::replay::RecordedAs;
+use touchup_session::scene::Scene;
 
 #[derive(Clone, Debug, Default, Args)]
 pub(super) struct RecordedFlags {

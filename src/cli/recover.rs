@@ -7,8 +7,8 @@ use clap::Args;
 
 use super::arm::recovered_ur;
 use super::{CliError, Losses, print_report, reported};
-use crate::probing::arm::ArmState;
-use crate::scene::Scene;
+use touchup_probing::arm::ArmState;
+use touchup_session::scene::Scene;
 
 #[derive(Debug, Args)]
 pub(super) struct RecoverArguments {

@@ -15,16 +15,16 @@ use super::told::{ToldFlags, ToldNumbers};
 #[cfg(any(feature = "ros", feature = "r2r"))]
 use super::web::WebFlags;
 use super::{CliError, Losses, check_kept_by, check_place, print_report, require};
-use crate::io::atomic::is_same_file;
-use crate::io::mesh_file::{MeshFileError, MeshUnit, check_target};
-use crate::io::recording::StampSource;
-use crate::refinement::RefinementOptions;
+use touchup_io::atomic::is_same_file;
+use touchup_io::mesh_file::{MeshFileError, MeshUnit, check_target};
+use touchup_io::recording::StampSource;
 #[cfg(any(feature = "ros", feature = "r2r"))]
-use crate::replay::{Recording, marker_filter};
+use touchup_node::node::NodeEnd;
+use touchup_session::refinement::RefinementOptions;
 #[cfg(any(feature = "ros", feature = "r2r"))]
-use crate::ros::node::NodeEnd;
-use crate::scene::{Mode, Scene};
-use crate::session::{SessionRecord, StrokeChanges};
+use touchup_session::replay::{Recording, marker_filter};
+use touchup_session::scene::{Mode, Scene};
+use touchup_session::session::{SessionRecord, StrokeChanges};
 
 #[derive(Clone, Debug, Default, Args)]
 pub(super) struct RefineArguments {

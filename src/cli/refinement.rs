@@ -10,16 +10,16 @@ use tracing::warn;
 use super::progress::WorkProgress;
 use super::told::ToldNumbers;
 use super::{CliError, Losses, by_reason};
-use crate::io::mesh_file::MeshUnit;
-use crate::live::Quantiles;
-use crate::mesh::RepairReport;
-use crate::reconstruct::CloudSummary;
-use crate::refinement::{
+use touchup_geometry::mesh::RepairReport;
+use touchup_io::mesh_file::MeshUnit;
+use touchup_method::reconstruct::CloudSummary;
+use touchup_session::live::Quantiles;
+use touchup_session::refinement::{
     InputNames, OpenedInput, RefinedScan, Refinement, RefinementOptions, RefinementSummary,
 };
-use crate::replay::RecordedAs;
-use crate::scene::{LeftOut, Memory, Scene, SceneCost};
-use crate::session::OutcomePlaces;
+use touchup_session::replay::RecordedAs;
+use touchup_session::scene::{LeftOut, Memory, Scene, SceneCost};
+use touchup_session::session::OutcomePlaces;
 
 /// Input and output files of a refinement.
 #[derive(Clone, Debug)]
@@ -166,7 +166,7 @@ impl RefinementFiles {
         };
         let input = refinement.input();
         SceneCost {
-            parts: input.scene.built(unused, &crate::FEATURES),
+            parts: input.scene.built(unused, &touchup_node::FEATURES),
             memory: Memory::of(refinement.footprint(), input.bytes()),
         }
     }

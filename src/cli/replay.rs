@@ -11,17 +11,18 @@ use serde::Serialize;
 use super::progress::WorkProgress;
 use super::recorded::RecordedFlags;
 use super::{CliError, Losses, counted, notify, print_report};
-use crate::io::recording::StampSource;
-use crate::replay::{Recording, Replayed, each_message, marker_filter};
-use crate::ros;
-use crate::ros::arguments::NodeConfig;
-use crate::ros::node::{CELL, as_pose, as_wrench};
-use crate::ros::parameters::ParameterValue;
-use crate::ros::playback::{PlayedTime, wrench_frame_id};
-use crate::ros::port::SamplePort;
-use crate::scene::Scene;
-use crate::stylus::MarkerFilter;
-use crate::stylus::{Message, SyncParams};
+use touchup_io::recording::StampSource;
+use touchup_method::stylus::MarkerFilter;
+use touchup_method::stylus::{Message, SyncParams};
+use touchup_node::ros;
+use touchup_node::ros::arguments::NodeConfig;
+use touchup_node::ros::parameters::CELL_FRAME;
+use touchup_node::ros::parameters::ParameterValue;
+use touchup_node::ros::playback::{PlayedTime, wrench_frame_id};
+use touchup_node::ros::port::SamplePort;
+use touchup_node::ros::{as_pose, as_wrench};
+use touchup_session::replay::{Recording, Replayed, each_message, marker_filter};
+use touchup_session::scene::Scene;
 
 /// Wait after discovery of the subscribers, which do not announce their own discovery of this node.
 const DISCOVERY: Duration = Duration::from_secs(1);
@@ -142,7 +143,7 @@ pub(super) fn play(
             }
             Message::Pose(pose) => {
                 played.poses += 1;
-                port.publish_pose(as_pose(pose, CELL))
+                port.publish_pose(as_pose(pose, CELL_FRAME))
             }
         };
         played.unsent += u64::from(!is_sent);
@@ -251,7 +252,7 @@ mod tests {
     use nalgebra::Isometry3;
 
     use super::*;
-    use crate::stylus::{StampedPose, StampedWrench, Wrench};
+    use touchup_method::stylus::{StampedPose, StampedWrench, Wrench};
 
     #[test]
     fn each_stream_comes_in_the_order_of_its_stamps() {

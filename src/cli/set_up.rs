@@ -6,13 +6,13 @@ use std::sync::Arc;
 use super::begin::BeginError;
 use super::path_parameter::path;
 use super::{CliError, notify};
-use crate::io::mesh_file::MeshFileError;
-use crate::io::recording::Topics;
-use crate::ros::arguments::NodeConfig;
-use crate::ros::node::NodeError;
-use crate::ros::parameters::{ParameterValue, Parameters};
-use crate::ros::web::{NodeSetup, SetupParams, SetupStep, WebServer};
-use crate::scan::ScanError;
+use touchup_io::mesh_file::MeshFileError;
+use touchup_io::recording::Topics;
+use touchup_node::node::NodeError;
+use touchup_node::page::{NodeSetup, SetupParams, SetupStep, WebServer};
+use touchup_node::ros::arguments::NodeConfig;
+use touchup_node::ros::parameters::{ParameterValue, Parameters};
+use touchup_session::scan::ScanError;
 
 /// Serves the setup.
 ///

@@ -16,11 +16,11 @@ use tokio::signal::unix::{Signal, signal};
 
 use super::error::{CliError, INTERRUPTED};
 use super::notify;
-use crate::probing::arm::StopRequest;
 #[cfg(any(feature = "ros", feature = "r2r"))]
-use crate::ros::inbox::Inbox;
+use touchup_node::ros::inbox::Inbox;
 #[cfg(any(feature = "ros", feature = "r2r"))]
-use crate::ros::port::Arrival;
+use touchup_node::ros::port::Arrival;
+use touchup_probing::arm::StopRequest;
 
 /// Calls `each` on its own thread with the count of signals, from 1 on.
 pub(super) fn on_each_signal(

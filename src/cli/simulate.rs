@@ -12,16 +12,16 @@ use tracing::warn;
 use super::progress::WorkProgress;
 use super::simulated_world::{OffFactor, world_named, write_told_scene, write_truth};
 use super::{CliError, Losses, check_kept, not_written, print_result, require};
-use crate::io::atomic::{create_folder, write_atomically};
-use crate::io::mesh_file::{MeshUnit, write_mesh};
-use crate::io::recording::{Record, Topics, write_recording};
-use crate::mesh::TriMesh;
-use crate::scan::{Scan, read_scan};
-use crate::sim::{
+use touchup_geometry::mesh::TriMesh;
+use touchup_io::atomic::{create_folder, write_atomically};
+use touchup_io::mesh_file::{MeshUnit, write_mesh};
+use touchup_io::recording::{Record, Topics, write_recording};
+use touchup_method::stylus::{MarkerFrame, Message};
+use touchup_session::scan::{Scan, read_scan};
+use touchup_sim::{
     CameraParams, DrawnWorld, Habit, MeshSurface, Moment, PathParams, ScannerParams, SimError,
     SimWorld, Stroke, StylusParams, Surface, Touch, plan_sides, scan, see_markers, touch,
 };
-use crate::stylus::{MarkerFrame, Message};
 
 /// File of the true part, in the output folder.
 const TRUTH_NAME: &str = "truth.ply";

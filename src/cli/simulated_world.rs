@@ -7,8 +7,8 @@ use serde_json::{Value, json};
 
 use super::CliError;
 use super::output::write_json;
-use crate::io::atomic::write_atomically;
-use crate::sim::{DrawnValue, DrawnWorld, SimWorld, ToldOff};
+use touchup_io::atomic::write_atomically;
+use touchup_sim::{DrawnValue, DrawnWorld, SimWorld, ToldOff};
 
 /// Error factor for all calibrated values, or for one.
 #[derive(Clone, Debug, PartialEq)]

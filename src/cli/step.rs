@@ -13,7 +13,7 @@ use std::io::{self, BufRead, Write};
 use nalgebra::{Point3, Vector3};
 use serde::Deserialize;
 
-use crate::haptic::{
+use touchup_method::haptic::{
     Along, ContactModel, DynamicsError, DynamicsParams, FaceDynamics, FaceState, StepRule,
 };
 

@@ -7,9 +7,9 @@ use clap::Args;
 use serde::Serialize;
 
 use super::CliError;
-use crate::scene::Scene;
+use touchup_session::scene::Scene;
 #[cfg(any(feature = "ros", feature = "r2r"))]
-use crate::scene::Setting;
+use touchup_session::scene::Setting;
 
 /// Flags for tip and scan, over the scene.
 #[derive(Clone, Debug, Default, Args)]
@@ -109,7 +109,7 @@ struct ToldNumber {
     source: ToldBy,
 }
 
-touchup_core::names! {
+touchup_method::names! {
     /// Source of a number.
     #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
     #[serde(rename_all = "snake_case")]

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Subcommand;
 
 use super::{CliError, Losses, print_result};
-use crate::ur::{child, setup};
+use touchup_node::ur::{child, setup};
 
 #[derive(Debug, Subcommand)]
 pub(super) enum UrArguments {

@@ -13,18 +13,18 @@ use super::require;
 use super::set_up::{set_up, set_up_on_page};
 #[cfg(feature = "web")]
 use super::{notify, notify_with_code};
-use crate::io::mesh_file::MeshUnit;
-use crate::mesh::TriMesh;
-use crate::ros::arguments::NodeConfig;
-use crate::ros::inbox::Inbox;
-use crate::ros::node::Prepared;
-use crate::ros::parameters::Parameters;
-use crate::ros::port::Port;
+use touchup_geometry::mesh::TriMesh;
+use touchup_io::mesh_file::MeshUnit;
+use touchup_node::node::Prepared;
 #[cfg(feature = "web")]
-use crate::ros::web::{Certificate, Invitation, NodeFacts, WebParams, WebServer};
+use touchup_node::page::{Certificate, Invitation, NodeFacts, WebParams, WebServer};
+use touchup_node::ros::arguments::NodeConfig;
+use touchup_node::ros::inbox::Inbox;
+use touchup_node::ros::parameters::Parameters;
+use touchup_node::ros::port::Port;
 #[cfg(feature = "web")]
-use crate::scan::read_scan;
-use crate::scene::Scene;
+use touchup_session::scan::read_scan;
+use touchup_session::scene::Scene;
 
 /// Server of a build without the page: none.
 #[cfg(not(feature = "web"))]

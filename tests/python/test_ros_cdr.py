@@ -28,10 +28,10 @@ def test_no_two_fields_of_a_message_are_alike():
 
 
 def test_the_standard_definitions_are_those_of_ros():
-    """Fields and constants below src/ros/messages/standard; of Marker constants that are old or not used are left out."""
+    """Fields and constants below crates/touchup-node/src/ros/messages/standard; of Marker constants that are old or not used are left out."""
     store = get_typestore(Stores.ROS2_JAZZY)
     left_out = {"MODIFY", "ARROW_STRIP"}
-    for path in (ROOT / "src/ros/messages/standard").glob("*/*.msg"):
+    for path in (ROOT / "crates/touchup-node/src/ros/messages/standard").glob("*/*.msg"):
         name = f"{path.parent.name}/msg/{path.stem}"
         ((constants, fields),) = get_types_from_msg(path.read_text(), name).values()
         known, known_fields = store.fielddefs[name]

@@ -10,10 +10,10 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::file_error::{FileError, read_file, write_file};
-use touchup_core::conformity::MeasuredNumber;
-use touchup_core::features::clusters::{Bend, Cluster};
-use touchup_core::features::{Feature, Form, InspectedQuantity, Measured, Relation, relations};
-use touchup_core::form::Deviation;
+use touchup_features::conformity::MeasuredNumber;
+use touchup_features::features::clusters::{Bend, Cluster};
+use touchup_features::features::{Feature, Form, InspectedQuantity, Measured, Relation, relations};
+use touchup_geometry::form::Deviation;
 
 /// Error of reading or writing a features file.
 #[derive(Debug, thiserror::Error)]

@@ -8,7 +8,7 @@ use std::path::Path;
 use nalgebra::Point3;
 
 use super::table::{Row, TableError, WantedColumns, read_table};
-use touchup_core::align::PointPair;
+use touchup_features::align::PointPair;
 
 const SCAN: [&str; 3] = ["scan_x_mm", "scan_y_mm", "scan_z_mm"];
 const SPACE: [&str; 3] = ["space_x_mm", "space_y_mm", "space_z_mm"];

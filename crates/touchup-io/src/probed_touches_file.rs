@@ -12,8 +12,8 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use super::file_error::{MAX_FILE_BYTES, read_up_to};
-use touchup_core::probing::arm::{Onset, TouchMoment, TouchOutcome};
-use touchup_core::probing::execute::{Probed, ProbedTouch};
+use touchup_probing::arm::{Onset, TouchMoment, TouchOutcome};
+use touchup_probing::execute::{Probed, ProbedTouch};
 
 reported! {
     /// One line; lengths in mm of O, travel along the approach.
@@ -239,7 +239,7 @@ fn write_line(touch: &TouchLine, out: &mut dyn Write) -> io::Result<()> {
 #[cfg(test)]
 mod tests {
     use nalgebra::{Point3, Vector3};
-    use touchup_core::probing::plan::TouchPlan;
+    use touchup_probing::plan::TouchPlan;
 
     use super::*;
 

@@ -10,7 +10,7 @@ use std::path::Path;
 
 use super::file_error::{FileError, write_file};
 use super::inspection_file::{CharacteristicRecord, InspectionRecord};
-use touchup_core::features::InspectedQuantity;
+use touchup_features::features::InspectedQuantity;
 
 /// Writes an inspection, as a whole or not at all.
 ///

@@ -11,7 +11,7 @@ use serde_json::{Map, Value};
 use crate::features_file::{FeatureFile, FeatureRecord, write_features};
 use crate::file_error::{FileError, write_file};
 use crate::touches_file::{self, TouchesFileError, write_touches};
-use touchup_core::stylus::ProbedPoint;
+use touchup_method::stylus::ProbedPoint;
 
 mod parquet_file;
 

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use super::table::{Row, TableError, WantedColumns, read_table};
-use touchup_core::stylus::Wrench;
+use touchup_method::stylus::Wrench;
 
 const COLUMNS: [&str; 10] = [
     "qx", "qy", "qz", "qw", "fx_n", "fy_n", "fz_n", "tx_nm", "ty_nm", "tz_nm",

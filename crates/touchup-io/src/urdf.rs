@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, UnitVector3, Vector3};
 use roxmltree::{Document, Node};
-use touchup_core::probing::arm::{Capsule, ChainError, ChainJoint, ChainLink, SerialChain};
+use touchup_probing::arm::{Capsule, ChainError, ChainJoint, ChainLink, SerialChain};
 
 /// Maximum size of an arm's description, bytes.
 const LARGEST: u64 = 16 << 20;
@@ -333,7 +333,7 @@ fn body(link: Node<'_, '_>) -> Option<Capsule> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use touchup_core::probing::arm::UrGeometry;
+    use touchup_probing::arm::UrGeometry;
 
     /// A UR5e as its driver describes it, in ROS's frames: joints about z, each at the end of the
     /// one before.

@@ -11,8 +11,8 @@ use numpy::{
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use touchup::cli::CliError;
-use touchup_core::mesh::{TriMesh, VertexId};
-use touchup_core::stylus::{
+use touchup_geometry::mesh::{TriMesh, VertexId};
+use touchup_method::stylus::{
     Message, ProbedPoint, Sample, SampleError, StampedPose, StampedWrench, Wrench, WrenchFrame,
     measured_rotation,
 };
@@ -100,7 +100,7 @@ pub fn mesh_of(arrays: &MeshArrays<'_>, name: &str) -> Result<TriMesh, CliError>
     let (vertices, faces) = mesh_vecs(arrays, name)?;
     let mesh = TriMesh::new(vertices, faces)?;
     if mesh.face_count() == 0 {
-        return Err(touchup_core::mesh::MeshError::Empty.into());
+        return Err(touchup_geometry::mesh::MeshError::Empty.into());
     }
     Ok(mesh)
 }

@@ -6,9 +6,9 @@ use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use touchup::cli::CliError;
-use touchup_core::stylus::{Message, WrenchFrame};
 use touchup_io::mesh_file::{MeshUnit, VertexColumn, read_vertex_columns, write_mesh_with};
 use touchup_io::recording::{Record, StampSource, Topics};
+use touchup_method::stylus::{Message, WrenchFrame};
 
 use touchup_session::replay::{RecordedAs, Recording};
 use touchup_session::scan::{Scan, read_scan};

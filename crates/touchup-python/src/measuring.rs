@@ -6,16 +6,16 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use serde_json::json;
 use touchup::cli::{CliError, comparison_json};
-use touchup_core::align::{
+use touchup_features::align::{
     FeaturesError, FeaturesParams, IcpParams, OrientedSample, PairsParams, PointPair, Surfaces,
     align_features, fit_pairs, icp,
 };
-use touchup_core::compare::{
+use touchup_features::compare::{
     CompareParams, IndexedMesh, Regions, SupportRegion, UnlikeExtents, compare as compare_shapes,
     sample_surface, surface_area,
 };
-use touchup_core::features::detect;
-use touchup_core::mesh::{FaceTree, TriMesh};
+use touchup_features::features::detect;
+use touchup_geometry::mesh::{FaceTree, TriMesh};
 use touchup_io::mesh_file::{MeshFile, MeshUnit, repaired};
 use touchup_session::session::found;
 use touchup_session::threads::Threads;

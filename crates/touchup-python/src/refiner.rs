@@ -10,8 +10,8 @@ use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
 use pyo3::types::{PyDict, PyTuple};
 use touchup::cli::CliError;
-use touchup_core::haptic::{Case, Mismatch, RefineCounts};
-use touchup_core::stylus::{Sample, SampleError};
+use touchup_method::haptic::{Case, Mismatch, RefineCounts};
+use touchup_method::stylus::{Sample, SampleError};
 use touchup_session::live::LiveError;
 use touchup_session::refinement::{Refinement, reason_of_refusal};
 
@@ -28,7 +28,7 @@ const REFUSED: u8 = 255;
 /// Effect of one sample.
 #[pyclass(frozen, module = "touchup")]
 pub struct Update {
-    update: touchup_core::haptic::Update,
+    update: touchup_method::haptic::Update,
 }
 
 #[pymethods]

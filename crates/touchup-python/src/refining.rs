@@ -5,9 +5,9 @@ use std::path::PathBuf;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use touchup::cli::CliError;
-use touchup_core::mesh::TriMesh;
-use touchup_core::stylus::{Message, WrenchFrame};
+use touchup_geometry::mesh::TriMesh;
 use touchup_io::mesh_file::{MeshFile, MeshUnit, repaired};
+use touchup_method::stylus::{Message, WrenchFrame};
 use touchup_session::refinement::{
     InputNames, RefinedScan, Refinement, RefinementInput, RefinementOptions, refine as refine_scan,
 };

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use pyo3::prelude::*;
 use serde_json::{Value, json};
 use touchup::cli::CliError;
-use touchup_core::parameters::{Parameter, Section};
+use touchup_method::parameters::{Parameter, Section};
 use touchup_session::scene::{Scene, SceneError};
 
 use crate::arrays;

@@ -3,7 +3,7 @@
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use touchup::cli::{CliError, OffFactor, ScannerKind, Side, Simulation, SimulationSettings};
-use touchup_core::stylus::WrenchFrame;
+use touchup_method::stylus::WrenchFrame;
 use touchup_sim::SimWorld;
 
 use crate::arrays::{Compact, MeshArrays, mesh_of, messages_into};

@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use serde_json::json;
 use touchup::cli::{plan_sweep, what_if_json};
-use touchup_core::compare::Displacement;
+use touchup_features::compare::Displacement;
 use touchup_session::sweep::{
     COVERAGE, GivenInput, JobReport, JobResult, JobRunner, JobsFile, SweepTables, WhatIf, tables_of,
 };

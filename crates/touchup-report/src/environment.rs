@@ -4,8 +4,8 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use touchup_core::haptic::RefineError;
 use touchup_io::atomic::write_atomically;
+use touchup_method::haptic::RefineError;
 use touchup_report::Effort;
 use touchup_report::peers::{PACKAGES, Peers, PeersAtSize, PeersInput, SCRIPT, UnknownLine};
 

@@ -1,9 +1,9 @@
 //! Errors of the measurements.
 
-use touchup_core::compare::CompareError;
-use touchup_core::haptic::RefineError;
-use touchup_core::mesh::MeshError;
-use touchup_core::stylus::SettingError;
+use touchup_features::compare::CompareError;
+use touchup_geometry::mesh::MeshError;
+use touchup_method::haptic::RefineError;
+use touchup_method::stylus::SettingError;
 use touchup_session::live::LiveError;
 use touchup_session::replay::ReplayError;
 use touchup_session::scene::SceneError;

@@ -13,7 +13,7 @@
 use std::sync::LazyLock;
 
 use nalgebra::{DMatrix, DVector, Matrix2, Point3, Vector3};
-use touchup_core::haptic::{Along, ContactModel, DynamicsParams, FaceState};
+use touchup_method::haptic::{Along, ContactModel, DynamicsParams, FaceState};
 
 use super::double_double::Double2;
 

@@ -2,9 +2,9 @@
 
 use std::cell::RefCell;
 
-use touchup_core::diagnose::{InputFinding, InputMonitor};
-use touchup_core::mesh::{FaceTree, TriMesh};
-use touchup_core::stylus::{ClockOffset, ContactEstimator, ContactEstimatorParams, MarkerFilter};
+use touchup_features::diagnose::{InputFinding, InputMonitor};
+use touchup_geometry::mesh::{FaceTree, TriMesh};
+use touchup_method::stylus::{ClockOffset, ContactEstimator, ContactEstimatorParams, MarkerFilter};
 
 use crate::replay::{Recording, ReplayError, each_sample};
 use crate::scene::Scene;

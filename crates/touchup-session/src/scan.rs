@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use nalgebra::Point3;
-use touchup_core::mesh::{RepairReport, Texture, TriMesh};
-use touchup_core::reconstruct::{CloudError, CloudSummary, CloudSurface, surface_of_cloud};
+use touchup_geometry::mesh::{RepairReport, Texture, TriMesh};
 use touchup_io::mesh_file::{MeshFile, MeshFileError, MeshOrPoints, MeshUnit, VertexColumn};
 use touchup_io::mesh_file::{read_appearance, read_mesh_or_points, repaired};
+use touchup_method::reconstruct::{CloudError, CloudSummary, CloudSurface, surface_of_cloud};
 
 use crate::threads::Threads;
 

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::sync::{Mutex, PoisonError};
 use std::thread::{Builder, available_parallelism, scope};
 
-use touchup_core::mesh::{Job, Workers};
+use touchup_geometry::mesh::{Job, Workers};
 
 /// Priority steps below the ordinary threads (setpriority(2)): with a third of their share the work
 /// still finishes on a busy machine.

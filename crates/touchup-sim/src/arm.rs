@@ -16,10 +16,10 @@ use super::ball::push_ball;
 use super::error::{SimError, not_negative, positive, up_to};
 use super::random::gauss_vector;
 use super::surface::Surface;
-use touchup_core::probing::arm::{
+use touchup_method::stylus::{Payload, Wrench};
+use touchup_probing::arm::{
     Arm, ArmError, ArmGeometry, ArmState, Command, Joints, MOST_JOINTS, Safety, UrGeometry,
 };
-use touchup_core::stylus::{Payload, Wrench};
 
 settings! {
     /// The arm, its mounting, and its imperfections.

@@ -5,7 +5,7 @@ use rand::SeedableRng;
 use rand_pcg::Pcg64;
 
 use super::random::{gauss, gauss_vector};
-use touchup_core::probing::arm::{ArmGeometry, MOST_JOINTS, UrGeometry};
+use touchup_probing::arm::{ArmGeometry, MOST_JOINTS, UrGeometry};
 
 /// True less nominal values, and errors that differ from touch to touch. Zero: an ideal arm.
 ///

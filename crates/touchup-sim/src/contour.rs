@@ -5,8 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::{Point3, Vector3};
 
 use super::field::{Field, cells};
-use touchup_core::mesh::triangle::intersect;
-use touchup_core::mesh::{BoxQuery, FaceId, FaceTree, MeshError, TriMesh};
+use touchup_geometry::mesh::triangle::intersect;
+use touchup_geometry::mesh::{BoxQuery, FaceId, FaceTree, MeshError, TriMesh};
 
 /// Rounds of flipping, relaxing and returning to the level.
 const ROUNDS: usize = 12;

@@ -28,7 +28,7 @@ pub enum SimError {
     OutOfReach,
     /// An impossible tip.
     #[error(transparent)]
-    Tip(#[from] touchup_core::stylus::SettingError),
+    Tip(#[from] touchup_method::stylus::SettingError),
     /// The path is empty.
     #[error("the path has no point: give at least one stroke with two points")]
     EmptyPath,
@@ -65,7 +65,7 @@ pub enum SimError {
     NothingSeen,
     /// The simulated scan is not a mesh.
     #[error(transparent)]
-    Mesh(#[from] touchup_core::mesh::MeshError),
+    Mesh(#[from] touchup_geometry::mesh::MeshError),
 }
 
 /// Refuses values that are not finite or not above zero.

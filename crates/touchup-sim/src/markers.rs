@@ -8,7 +8,7 @@ use rand_pcg::Pcg64;
 use super::error::{SimError, positive, up_to};
 use super::random::{gauss_vector, uniform};
 use super::sensor::{Moment, TICK};
-use touchup_core::stylus::{MarkerBody, MarkerFrame, MarkerObservation};
+use touchup_method::stylus::{MarkerBody, MarkerFrame, MarkerObservation};
 
 settings! {
     /// The camera and its errors.

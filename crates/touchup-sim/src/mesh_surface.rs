@@ -4,8 +4,8 @@ use nalgebra::{Point3, Vector3};
 
 use super::error::SimError;
 use super::surface::{Bounds, Surface, SurfacePoint};
-use touchup_core::mesh::triangle::closest_point;
-use touchup_core::mesh::{BoxQuery, FaceHit, FaceTree, MeshError, TriMesh, pseudo_normal};
+use touchup_geometry::mesh::triangle::closest_point;
+use touchup_geometry::mesh::{BoxQuery, FaceHit, FaceTree, MeshError, TriMesh, pseudo_normal};
 
 /// A triangle mesh with exact distances to its triangles.
 ///

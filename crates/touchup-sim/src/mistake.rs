@@ -2,9 +2,9 @@
 
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
-use touchup_core::diagnose::InputCause;
-use touchup_core::mesh::TriMesh;
-use touchup_core::stylus::{Message, StampedPose, StampedWrench, TipParams};
+use touchup_features::diagnose::InputCause;
+use touchup_geometry::mesh::TriMesh;
+use touchup_method::stylus::{Message, StampedPose, StampedWrench, TipParams};
 
 /// A scan, a recording of its part, and the tip settings.
 #[derive(Clone, Debug)]
@@ -205,7 +205,7 @@ impl ToldRecording {
 
     fn scan(mut self, change: impl Fn(Point3<f64>) -> Point3<f64>) -> Self {
         (0..self.scan.vertex_slots() as u32)
-            .map(touchup_core::mesh::VertexId)
+            .map(touchup_geometry::mesh::VertexId)
             .for_each(|vertex| {
                 let moved = change(self.scan.position(vertex));
                 self.scan.set_position(vertex, moved);
@@ -214,7 +214,7 @@ impl ToldRecording {
     }
 
     fn inside_out(mut self) -> Self {
-        let corners = |(_, [a, b, c]): (_, [touchup_core::mesh::VertexId; 3])| [a.0, c.0, b.0];
+        let corners = |(_, [a, b, c]): (_, [touchup_geometry::mesh::VertexId; 3])| [a.0, c.0, b.0];
         let faces = self.scan.faces().map(corners).collect();
         // the same faces with reordered corners remain a valid mesh
         if let Ok(scan) = TriMesh::new(self.scan.positions().to_vec(), faces) {

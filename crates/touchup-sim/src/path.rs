@@ -5,7 +5,7 @@ use nalgebra::{Isometry3, Point2, Point3, Unit, Vector2, Vector3};
 use super::error::{SimError, not_negative, positive, up_to};
 use super::plate::{Extrusion, Plate, PlateStadium};
 use super::surface::{Bounds, Surface};
-use touchup_core::numeric::turned_to;
+use touchup_geometry::numeric::turned_to;
 
 /// One pull of the hand.
 #[derive(Clone, Debug, PartialEq)]

@@ -12,7 +12,7 @@ use super::error::{SimError, positive, require};
 use super::random::gauss_vector;
 use super::surface::{Bounds, Surface, SurfacePoint};
 use super::wavy::height_field;
-use touchup_core::mesh::TriMesh;
+use touchup_geometry::mesh::TriMesh;
 
 /// Length of the sides, m.
 const SIDE: f64 = 0.050;
@@ -133,7 +133,7 @@ impl Peaks {
 pub fn add_vertex_noise(mesh: &mut TriMesh, noise: f64, offset: &Vector3<f64>, seed: u64) {
     let mut rng = Pcg64::seed_from_u64(seed);
     for vertex in 0..mesh.vertex_count() as u32 {
-        let vertex = touchup_core::mesh::VertexId(vertex);
+        let vertex = touchup_geometry::mesh::VertexId(vertex);
         mesh.set_position(
             vertex,
             mesh.position(vertex) + gauss_vector(&mut rng) * noise + offset,

@@ -8,7 +8,7 @@
 use nalgebra::{Point2, Point3, Vector2, Vector3};
 
 use super::surface::{Bounds, Surface, SurfacePoint};
-use touchup_core::features::{InspectedQuantity, Kind};
+use touchup_features::features::{InspectedQuantity, Kind};
 
 /// All points within `radius` of a segment; a disc when the segment has no length.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -7,7 +7,7 @@ use nalgebra::{Point2, Point3};
 use super::contour::MeshDraft;
 use super::plate::{Extrusion, Plate, PlateStadium};
 use super::triangulate::triangulate;
-use touchup_core::mesh::{MeshError, TriMesh};
+use touchup_geometry::mesh::{MeshError, TriMesh};
 
 /// Fewest corners of a circle: a square is the smallest polygon that keeps a hole open.
 const MIN_CORNERS: f64 = 4.0;

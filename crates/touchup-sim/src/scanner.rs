@@ -15,8 +15,8 @@ use super::field::Field;
 use super::path::looking_along;
 use super::random::{gauss, gauss_vector, uniform};
 use super::surface::Surface;
-use touchup_core::mesh::TriMesh;
-use touchup_core::numeric::weighted_quantile;
+use touchup_geometry::mesh::TriMesh;
+use touchup_geometry::numeric::weighted_quantile;
 
 settings! {
     /// Errors of the scanner.

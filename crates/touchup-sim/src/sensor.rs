@@ -11,7 +11,7 @@ use super::ball::BallContact;
 use super::bending::TipBending;
 use super::error::{SimError, not_negative, require, up_to};
 use super::random::{Drift, gauss, gauss_vector, uniform};
-use touchup_core::stylus::{Message, StampedPose, StampedWrench, Wrench};
+use touchup_method::stylus::{Message, StampedPose, StampedWrench, Wrench};
 
 /// The true state at one instant.
 #[derive(Clone, Debug, PartialEq)]

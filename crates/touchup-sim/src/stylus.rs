@@ -18,8 +18,8 @@ use super::random::{Drift, SmoothField};
 use super::sensor::{Moment, Sensor, SensorParams, TICK};
 use super::surface::{Bounds, Surface};
 use super::tip::SimTip;
-use touchup_core::numeric::turned_to;
-use touchup_core::stylus::{Message, TipShape};
+use touchup_geometry::numeric::turned_to;
+use touchup_method::stylus::{Message, TipShape};
 
 settings! {
     /// The stylus and the hand that leads it.

@@ -12,7 +12,7 @@ use nalgebra::{Point3, UnitQuaternion, Vector3};
 use super::ball::{BallContact, TipBall, push_balls};
 use super::error::SimError;
 use super::surface::Surface;
-use touchup_core::stylus::{TipBody, TipShape};
+use touchup_method::stylus::{TipBody, TipShape};
 
 /// Balls around a rim: between two of them a rim of 2 mm is 4 µm too small.
 const AROUND: usize = 48;
@@ -161,7 +161,7 @@ fn ring(from_axis: f64, radius: f64, rim: f64) -> impl Iterator<Item = TipBall> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use touchup_core::stylus::TipPlace;
+    use touchup_method::stylus::TipPlace;
 
     #[test]
     fn the_balls_fill_the_tip_and_do_not_stand_out() {

@@ -3,8 +3,8 @@
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
-use touchup_core::mesh::{MeshError, TriMesh};
-use touchup_core::stylus::{Sample, Wrench};
+use touchup_geometry::mesh::{MeshError, TriMesh};
+use touchup_method::stylus::{Sample, Wrench};
 
 /// Default side of the plate, m.
 pub const SIDE: f64 = 0.3;

@@ -3,7 +3,7 @@
 use nalgebra::{Point3, Vector3};
 
 use super::surface::{Bounds, Surface, SurfacePoint};
-use touchup_core::calibrate::ReferenceSphere;
+use touchup_features::calibrate::ReferenceSphere;
 
 /// A surface, and spheres outside of it.
 pub struct WithSpheres<'a> {

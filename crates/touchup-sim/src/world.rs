@@ -18,7 +18,7 @@ use super::scanner::{ScannerParams, scan};
 use super::sensor::SensorParams;
 use super::stylus::{StylusParams, Touch, touch};
 use super::surface::Surface;
-use touchup_core::mesh::TriMesh;
+use touchup_geometry::mesh::TriMesh;
 
 /// A world by its name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -12,9 +12,9 @@ use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use rand::SeedableRng;
 use rand_distr::{Distribution, Normal};
 use rand_pcg::Pcg64;
-use touchup::probing::arm::Joints;
-use touchup::sim::{ArmParams, Surface, push_ball};
-use touchup::stylus::Payload;
+use touchup_method::stylus::Payload;
+use touchup_probing::arm::Joints;
+use touchup_sim::{ArmParams, Surface, push_ball};
 
 /// Time between two states, s.
 pub const PERIOD: f64 = 2e-3;

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
-use touchup::stylus::Payload;
+use touchup_method::stylus::Payload;
 
 use super::body::{Body, Force, HARD_STOP, Motion, PERIOD};
 use super::record::Record;

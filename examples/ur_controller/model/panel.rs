@@ -1,7 +1,7 @@
 //! What somebody at the panel, at the cable or at the part does, a line each; and the answers of
 //! the dashboard.
 
-use touchup::stylus::Payload;
+use touchup_method::stylus::Payload;
 
 use super::controller::{Controller, Safety};
 

@@ -3,7 +3,7 @@
 use crate::{closed_box, vector};
 use arbitrary::{Result, Unstructured};
 use nalgebra::Point3;
-use touchup_core::mesh::repair;
+use touchup_geometry::mesh::repair;
 use touchup_session::session::found;
 
 fn detect(bytes: &mut Unstructured) -> Result<()> {

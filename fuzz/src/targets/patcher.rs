@@ -3,9 +3,9 @@
 use crate::{BALL, assert_is_somewhere, closed_box, open_edges, sample};
 use arbitrary::{Result, Unstructured};
 use nalgebra::Point3;
-use touchup_core::mesh::FaceTree;
-use touchup_core::reconstruct::{Patcher, PatcherParams};
-use touchup_core::stylus::{ContactEstimator, ContactEstimatorParams};
+use touchup_geometry::mesh::FaceTree;
+use touchup_method::reconstruct::{Patcher, PatcherParams};
+use touchup_method::stylus::{ContactEstimator, ContactEstimatorParams};
 
 fn patch(bytes: &mut Unstructured) -> Result<()> {
     let scan = closed_box([4e-3, 3e-3, 2e-3], 3);

@@ -1,9 +1,9 @@
 //! A scene: what is accepted makes settings that the rooms take or refuse by name.
 
 use crate::closed_box;
-use touchup_core::haptic::Refiner;
-use touchup_core::reconstruct::Patcher;
-use touchup_core::stylus::{Synchroniser, WrenchFrame};
+use touchup_method::haptic::Refiner;
+use touchup_method::reconstruct::Patcher;
+use touchup_method::stylus::{Synchroniser, WrenchFrame};
 use touchup_session::scene::Scene;
 
 /// One input of this target.

@@ -4,7 +4,7 @@
 use crate::{number, vector};
 use arbitrary::{Result, Unstructured};
 use nalgebra::{Point3, Vector3};
-use touchup_core::haptic::{
+use touchup_method::haptic::{
     Along, ContactModel, DynamicsParams, FaceDynamics, FaceState, StepRule,
 };
 

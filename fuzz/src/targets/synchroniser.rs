@@ -4,9 +4,9 @@
 use crate::{BALL, closed_box, number, rotation, vector};
 use arbitrary::{Result, Unstructured};
 use nalgebra::{Isometry3, Translation3};
-use touchup_core::diagnose::{InputMonitor, InputMonitorParams};
-use touchup_core::mesh::FaceTree;
-use touchup_core::stylus::{
+use touchup_features::diagnose::{InputMonitor, InputMonitorParams};
+use touchup_geometry::mesh::FaceTree;
+use touchup_method::stylus::{
     CompensatorParams, ContactEstimator, ContactEstimatorParams, ContactGateParams, Message,
     Placement, StampedPose, StampedWrench, SyncParams, Synchroniser, TipShape, Wrench,
 };

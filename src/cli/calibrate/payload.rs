@@ -9,13 +9,13 @@ use super::super::arm::{CellArguments, Measurement, RobotName, TruePayload};
 use super::super::probing::KeptMeasurements;
 use super::super::{CliError, Losses, require};
 use super::{CalibrationTarget, RecordingFlags};
-use crate::calibration::{
+use touchup_method::stylus::WrenchFrame;
+use touchup_session::calibration::{
     PayloadCalibrationParams, calibrate_payload, calibrate_payload_by_arm,
     calibrate_payload_by_table,
 };
-use crate::scene::Scene;
-use crate::sim::ArmParams;
-use crate::stylus::WrenchFrame;
+use touchup_session::scene::Scene;
+use touchup_sim::ArmParams;
 
 #[derive(Debug, Args)]
 #[group(id = "poses", required = true, multiple = false, args = ["bag", "samples", "robot"])]

@@ -4,11 +4,11 @@ use std::path::Path;
 
 use clap::Args;
 
-use crate::calibration::{CalibrationError, CalibrationRecording};
 use crate::cli::CliError;
 use crate::cli::progress::WorkProgress;
 use crate::cli::recorded::RecordedFlags;
-use crate::scene::Scene;
+use touchup_session::calibration::{CalibrationError, CalibrationRecording};
+use touchup_session::scene::Scene;
 
 /// Recording flags of a calibration.
 #[derive(Debug, Args)]

@@ -6,7 +6,7 @@ use clap::Args;
 
 use super::super::{CliError, Losses, check_kept, require};
 use super::{CalibrationTarget, RecordingFlags};
-use crate::calibration::calibrate_scan;
+use touchup_session::calibration::calibrate_scan;
 
 #[derive(Debug, Args)]
 pub(in crate::cli) struct ScanArguments {

@@ -6,7 +6,7 @@ use super::super::arm::{ArmArguments, TouchesOutput};
 use super::super::check::repeated;
 use super::super::{CliError, Losses};
 use super::CalibrationTarget;
-use crate::calibration::{Calibration, StiffnessFound};
+use touchup_session::calibration::{Calibration, StiffnessFound};
 
 #[derive(Debug, Args)]
 pub(in crate::cli) struct StiffnessArguments {

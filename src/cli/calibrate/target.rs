@@ -7,10 +7,10 @@ use std::time::SystemTime;
 use clap::Args;
 use tracing::warn;
 
-use crate::calibration::{Calibrated, Calibration, calibrated_scene};
 use crate::cli::{CliError, Losses, check_kept, not_written, print_report};
-use crate::io::atomic::write_atomically;
-use crate::scene::Scene;
+use touchup_io::atomic::write_atomically;
+use touchup_session::calibration::{Calibrated, Calibration, calibrated_scene};
+use touchup_session::scene::Scene;
 
 /// Error message for a calibration with an arm but no scene.
 const NO_SCENE: &str =

@@ -10,9 +10,9 @@ use super::super::arm::{CellArguments, Measurement, RobotName, TouchesOutput};
 use super::super::probing::{KeptMeasurements, millimetres};
 use super::super::{CliError, Losses};
 use super::{CalibrationTarget, RecordingFlags};
-use crate::calibration::{calibrate_tip, calibrate_tip_by_arm};
-use crate::scene::Scene;
-use crate::sim::ArmParams;
+use touchup_session::calibration::{calibrate_tip, calibrate_tip_by_arm};
+use touchup_session::scene::Scene;
+use touchup_sim::ArmParams;
 
 #[derive(Debug, Args)]
 #[group(id = "swing", required = true, multiple = false, args = ["bag", "robot"])]

@@ -12,11 +12,11 @@ use nalgebra::Point3;
 use super::arm::{ArmArguments, Measurement, TouchesOutput};
 use super::probing::{KeptMeasurements, check_temperature, metres, millimetres};
 use super::{CliError, Losses, print_report, require, require_positive, write_json};
-use crate::calibrate::{ReferenceSphere, SphereReading, check_workspace};
-use crate::probing::execute::{Prober, Repeatability, SphereTouches, SpotError};
-use crate::scene::{CheckRecord, Scene};
 use report::SphereResults;
 pub(super) use report::{CheckReport, Gates};
+use touchup_features::calibrate::{ReferenceSphere, SphereReading, check_workspace};
+use touchup_probing::execute::{Prober, Repeatability, SphereTouches, SpotError};
+use touchup_session::scene::{CheckRecord, Scene};
 
 /// Allowed number of touches; three are the minimum for both sides and a repeatability.
 const TOUCHES: std::ops::RangeInclusive<usize> = 3..=100;

@@ -4,12 +4,12 @@ use std::fmt;
 
 use serde::Serialize;
 
-use crate::calibrate::{CheckedPlace, ReferenceSphere, SphereFit, WorkspaceCheck};
 use crate::cli::{Losses, reported};
-use crate::probing::execute::{
+use touchup_features::calibrate::{CheckedPlace, ReferenceSphere, SphereFit, WorkspaceCheck};
+use touchup_probing::execute::{
     NotReached, Repeatability, SphereOrientation, SphereTouches, SpotTouch,
 };
-use crate::scene::CheckRecord;
+use touchup_session::scene::CheckRecord;
 
 /// Gates of a check, and the uncertainty of the sphere diameters.
 #[derive(Clone, Copy, Debug, Serialize)]

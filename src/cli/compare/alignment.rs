@@ -7,17 +7,17 @@ use nalgebra::{Isometry3, Vector3};
 use serde::Serialize;
 use tracing::warn;
 
-use crate::align::{
+use crate::cli::progress::WorkProgress;
+use crate::cli::{CliError, counted, print_report, reported};
+use touchup_features::align::{
     Alternative, FeaturesError, FeaturesParams, FreeTurn, IcpFit, IcpParams, Motion,
     OrientedSample, PairsParams, Surfaces, align_features, fit_pairs, icp,
 };
-use crate::cli::progress::WorkProgress;
-use crate::cli::{CliError, counted, print_report, reported};
-use crate::compare::{IndexedMesh, sample_surface, surface_area};
-use crate::features::detect;
-use crate::io::pairs_file::read_pairs;
-use crate::mesh::{TriMesh, VertexId};
-use crate::threads::Threads;
+use touchup_features::compare::{IndexedMesh, sample_surface, surface_area};
+use touchup_features::features::detect;
+use touchup_geometry::mesh::{TriMesh, VertexId};
+use touchup_io::pairs_file::read_pairs;
+use touchup_session::threads::Threads;
 
 /// Number of points of the mesh for one alignment.
 const POINTS: f64 = 100_000.0;

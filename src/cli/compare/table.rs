@@ -7,10 +7,10 @@ use nalgebra::Vector3;
 
 use super::alignment::Alignment;
 use crate::cli::{counted, reported};
-use crate::compare::{
+use touchup_features::compare::{
     Comparison, Histogram, RegionComparison, Summary, SupportRegion, TiltSummary,
 };
-use crate::mesh::TriMesh;
+use touchup_geometry::mesh::TriMesh;
 
 reported! {
     /// Output of `--json`.

@@ -7,12 +7,12 @@ use clap::Args;
 use crate::cli::pictures::view_from;
 use crate::cli::progress::WorkProgress;
 use crate::cli::{CliError, check_outputs};
-use crate::conformity::{DecisionParams, DecisionRule, GeneralTolerance};
-use crate::inspection::{
+use touchup_features::conformity::{DecisionParams, DecisionRule, GeneralTolerance};
+use touchup_inspect::{
     AlignmentMethod, DrawingParams, InspectionParams, InspectionSource, ReportFiles, decision_rule,
     general_tolerance,
 };
-use crate::io::mesh_file::MeshUnit;
+use touchup_io::mesh_file::MeshUnit;
 
 #[derive(Debug, Args)]
 pub(in crate::cli) struct InspectArguments {

@@ -1,7 +1,7 @@
 //! Errors of an inspection, with the exit code of each kind.
 
 use crate::cli::CliError;
-use crate::inspection::InspectionError;
+use touchup_inspect::InspectionError;
 
 impl From<InspectionError> for CliError {
     fn from(error: InspectionError) -> Self {

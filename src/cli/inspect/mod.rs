@@ -10,7 +10,7 @@ pub(super) use self::arguments::InspectArguments;
 use super::pictures::view_from;
 use super::progress::WorkProgress;
 use super::{CliError, Losses, print_report};
-use crate::inspection::{Inspected, InspectionSource, PartDrawing, PartPicture, inspected};
+use touchup_inspect::{Inspected, InspectionSource, PartDrawing, PartPicture, inspected};
 
 /// Runs `touchup inspect`: inspects, and prints the result.
 pub(super) fn inspect(arguments: &InspectArguments) -> Result<Losses, CliError> {

@@ -1,9 +1,9 @@
 //! Inspection in a few lines.
 
 use crate::cli::{Losses, counted};
-use crate::conformity::Decision;
-use crate::inspection::{first_few, percent};
-use crate::io::inspection_file::{AlignmentRecord, CharacteristicRecord, InspectionRecord};
+use touchup_features::conformity::Decision;
+use touchup_inspect::{first_few, percent};
+use touchup_io::inspection_file::{AlignmentRecord, CharacteristicRecord, InspectionRecord};
 
 /// Table for stdout.
 pub(super) fn in_words(record: &InspectionRecord) -> String {

@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use crate::cli::{CliError, Losses, counted, print_result, require};
-use crate::inspection::{DrawingParams, template};
-use crate::io::features_file::FeatureFile;
-use crate::io::nominal_file::{NominalFileError, is_nominal_file, write_nominal};
+use touchup_inspect::{DrawingParams, template};
+use touchup_io::features_file::FeatureFile;
+use touchup_io::nominal_file::{NominalFileError, is_nominal_file, write_nominal};
 
 /// Writes nominal values of a CAD mesh, or else of the measured features.
 pub(super) fn write(

@@ -5,11 +5,11 @@
 use std::path::Path;
 
 use crate::cli::{CliError, not_written};
-use crate::io::probed_touches_file::TouchLog;
-use crate::io::recording::{SegmentedWriter, Topics};
-use crate::probing::arm::ArmState;
-use crate::probing::execute::ProbedTouch;
-use crate::stylus::Message;
+use touchup_io::probed_touches_file::TouchLog;
+use touchup_io::recording::{SegmentedWriter, Topics};
+use touchup_method::stylus::Message;
+use touchup_probing::arm::ArmState;
+use touchup_probing::execute::ProbedTouch;
 
 /// File of the touches, a line each.
 pub(super) const TOUCHES: &str = "probed_touches.jsonl";

@@ -9,10 +9,10 @@ use super::files::{RECORDING, TOUCHES};
 use super::ready::Ready;
 use super::report::{ProbedFile, ProbedRecord, kind_of};
 use crate::cli::{CliError, require, write_json};
-use crate::io::mesh_file::MeshUnit;
-use crate::io::probed_touches_file::{TouchLine, read_probed_touches};
-use crate::io::session_folder::{fingerprint, read_text};
-use crate::probing::execute::Flag;
+use touchup_io::mesh_file::MeshUnit;
+use touchup_io::probed_touches_file::{TouchLine, read_probed_touches};
+use touchup_io::session_folder::{fingerprint, read_text};
+use touchup_probing::execute::Flag;
 
 const REQUEST: &str = "probing.json";
 const RECORDS: &str = "probed.json";

@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::thread::Builder;
 
-use crate::probing::arm::ArmState;
+use touchup_probing::arm::ArmState;
 
 /// Capacity of the state queue: 16 s of an arm at 500 Hz.
 pub(super) const QUEUE: usize = 8192;
@@ -140,8 +140,8 @@ mod tests {
     use nalgebra::{Isometry3, Vector3};
 
     use super::*;
-    use crate::probing::arm::Safety;
-    use crate::stylus::Wrench;
+    use touchup_method::stylus::Wrench;
+    use touchup_probing::arm::Safety;
 
     /// Consumer that takes a state per permit.
     struct Permitted {

@@ -7,13 +7,13 @@ use nalgebra::{Point3, Vector3};
 
 use super::report::kind_of;
 use crate::cli::{CliError, require};
-use crate::conformity::{
+use touchup_features::conformity::{
     DecisionParams, FeatureMatch, FeaturePlace, SoughtFeature, ToleranceLimits, match_features,
 };
-use crate::features::{InspectedQuantity, Kind};
-use crate::io::nominal_file::{NominalRecord, NominalTolerance, read_nominal};
-use crate::probing::execute::{Flag, StaticWorld, World};
-use crate::probing::plan::{DecisionGoal, SoughtCharacteristic};
+use touchup_features::features::{InspectedQuantity, Kind};
+use touchup_io::nominal_file::{NominalRecord, NominalTolerance, read_nominal};
+use touchup_probing::execute::{Flag, StaticWorld, World};
+use touchup_probing::plan::{DecisionGoal, SoughtCharacteristic};
 
 /// Search radius for the surface at a flag, m.
 const NEAR: f64 = 20e-3;

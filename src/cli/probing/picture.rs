@@ -6,10 +6,10 @@ use nalgebra::{Point3, Vector3};
 
 use crate::cli::pictures::write_picture;
 use crate::cli::{CliError, counted};
-use crate::compare::{DrawnMesh, PicturePanel, PictureParams, Rgb};
-use crate::io::probed_touches_file::TouchLine;
-use crate::mesh::TriMesh;
-use crate::probing::execute::{Flag, Plan, PlannedMotion, Probed};
+use touchup_features::compare::{DrawnMesh, PicturePanel, PictureParams, Rgb};
+use touchup_geometry::mesh::TriMesh;
+use touchup_io::probed_touches_file::TouchLine;
+use touchup_probing::execute::{Flag, Plan, PlannedMotion, Probed};
 
 const PART: Rgb = [206, 209, 214];
 const FLAG: Rgb = [20, 20, 20];

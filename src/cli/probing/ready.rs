@@ -6,16 +6,16 @@ use std::time::SystemTime;
 use nalgebra::{Isometry3, Point3};
 use tracing::info;
 
-use crate::calibrate::{ReferenceSphere, beside_spheres};
 use crate::cli::arm_errors::ArmErrorsName;
 use crate::cli::told::{ToldFlags, ToldNumbers};
 use crate::cli::{CliError, require};
-use crate::io::mesh_file::MeshUnit;
-use crate::mesh::TriMesh;
-use crate::probing::execute::{Cell, ProbeParams, StaticWorld};
-use crate::scan::{Scan, read_scan};
-use crate::scene::{CheckStanding, Scene, simulated_arm};
-use crate::sim::ArmParams;
+use touchup_features::calibrate::{ReferenceSphere, beside_spheres};
+use touchup_geometry::mesh::TriMesh;
+use touchup_io::mesh_file::MeshUnit;
+use touchup_probing::execute::{Cell, ProbeParams, StaticWorld};
+use touchup_session::scan::{Scan, read_scan};
+use touchup_session::scene::{CheckStanding, Scene, simulated_arm};
+use touchup_sim::ArmParams;
 
 /// Current validity of the arm's check; `None` without `robot`.
 fn standing(scene: &Scene) -> Option<CheckStanding> {

@@ -8,13 +8,13 @@ use serde::{Deserialize, Serialize};
 use crate::cli::refinement::RefineSummary;
 use crate::cli::told::ToldNumbers;
 use crate::cli::{counted, reported};
-use crate::conformity::Decision;
-use crate::features::{InspectedQuantity, Kind};
-use crate::io::features_file::FeatureRecord;
-use crate::probing::arm::SlideRecord;
-use crate::probing::execute::{Ending, Flag, Probed, ProbedSlide, ProbedTouch, ReferenceTouch};
-use crate::probing::plan::DecidedCharacteristic;
-use crate::scene::{CheckRecord, CheckStanding};
+use touchup_features::conformity::Decision;
+use touchup_features::features::{InspectedQuantity, Kind};
+use touchup_io::features_file::FeatureRecord;
+use touchup_probing::arm::SlideRecord;
+use touchup_probing::execute::{Ending, Flag, Probed, ProbedSlide, ProbedTouch, ReferenceTouch};
+use touchup_probing::plan::DecidedCharacteristic;
+use touchup_session::scene::{CheckRecord, CheckStanding};
 
 reported! {
     /// Results of one flag, in `probed.json`.

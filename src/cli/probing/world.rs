@@ -9,18 +9,18 @@ use nalgebra::{Isometry3, Point3};
 use super::files::ProbeFiles;
 use super::follower::{Follower, QUEUE, TakeStates};
 use super::ready::Ready;
-use crate::calibrate::StaticPose;
 use crate::cli::progress::WorkProgress as Bar;
 use crate::cli::signals::StopSignals;
 use crate::cli::{CliError, not_written, print_result};
-use crate::io::probed_touches_file::{TouchLine, TouchLog};
-use crate::io::static_poses::{StaticPoseLog, static_pose_line};
-use crate::live::{Engine, Gate, LiveError, Pace, Renewal};
-use crate::mesh::{FaceHit, FaceTree, TriMesh};
-use crate::probing::arm::{ArmState, Observer, StopRequest};
-use crate::probing::execute::{ProbedTouch, Progress, StaticWorld, World};
-use crate::stylus::{Message, Sample, StampedPose, WrenchFrame};
-use crate::threads::Threads;
+use touchup_features::calibrate::StaticPose;
+use touchup_geometry::mesh::{FaceHit, FaceTree, TriMesh};
+use touchup_io::probed_touches_file::{TouchLine, TouchLog};
+use touchup_io::static_poses::{StaticPoseLog, static_pose_line};
+use touchup_method::stylus::{Message, Sample, StampedPose, WrenchFrame};
+use touchup_probing::arm::{ArmState, Observer, StopRequest};
+use touchup_probing::execute::{ProbedTouch, Progress, StaticWorld, World};
+use touchup_session::live::{Engine, Gate, LiveError, Pace, Renewal};
+use touchup_session::threads::Threads;
 
 /// Room reserved for new faces.
 const ROOM: usize = 1 << 16;

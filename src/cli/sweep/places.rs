@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::super::{CliError, check_kept_by, check_place, require};
-use crate::sweep::JobsFile;
+use touchup_session::sweep::JobsFile;
 
 /// Folder of the results: as named, or `results` beside the jobs.
 pub(in crate::cli) fn results_of(jobs: &Path, named: Option<&PathBuf>) -> PathBuf {

@@ -7,8 +7,8 @@ use clap::Args;
 
 use super::super::progress::WorkProgress;
 use super::super::{CliError, Losses, check_kept, check_place, counted, not_written, print_result};
-use crate::io::atomic::AtomicFile;
-use crate::sweep::{JobsFile, SweepPlan};
+use touchup_io::atomic::AtomicFile;
+use touchup_session::sweep::{JobsFile, SweepPlan};
 
 #[derive(Debug, Args)]
 pub(in crate::cli) struct PlanArguments {

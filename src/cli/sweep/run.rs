@@ -10,7 +10,7 @@ use super::super::error::UNSOUND;
 use super::super::progress::WorkProgress;
 use super::super::{CliError, Losses, counted, print_report, print_result};
 use super::places::results_of;
-use crate::sweep::{GivenInput, JobReport, JobRunner, JobsFile, SweepError};
+use touchup_session::sweep::{GivenInput, JobReport, JobRunner, JobsFile, SweepError};
 
 #[derive(Debug, Args)]
 pub(in crate::cli) struct RunArguments {

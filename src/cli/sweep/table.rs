@@ -8,7 +8,7 @@ use serde_json::json;
 use super::super::{CliError, Losses, counted, print_report, require};
 use super::places::{check_table, results_of};
 use super::run::MOST_NAMED;
-use crate::sweep::{SweepTables, tables_of};
+use touchup_session::sweep::{SweepTables, tables_of};
 
 #[derive(Debug, Args)]
 pub(in crate::cli) struct TableArguments {

@@ -15,7 +15,7 @@ use self::tables::{features_table, vertices_table, write_moved_mesh};
 use super::progress::WorkProgress;
 use super::sweep::{check_table, results_of};
 use super::{CliError, Losses, check_kept_by, check_outputs, not_written, print_report, require};
-use crate::sweep::{JobResult, JobsFile, WhatIf};
+use touchup_session::sweep::{JobResult, JobsFile, WhatIf};
 
 #[derive(Debug, Args)]
 pub(super) struct WhatIfArguments {
@@ -63,7 +63,7 @@ pub(super) fn what_if(arguments: &WhatIfArguments) -> Result<Losses, CliError> {
     drop(comparing);
     if let Some(path) = &arguments.out {
         let text = page(&report, [&a, &b], &found).map_err(not_written(path))?;
-        crate::io::text_file::write_text(path, &text).map_err(CliError::not_written)?;
+        touchup_io::text_file::write_text(path, &text).map_err(CliError::not_written)?;
     }
     if let Some(path) = &arguments.vertices_out {
         vertices_table([&a, &b], &found).write(path)?;

@@ -7,10 +7,12 @@ use touchup_document::number::{fixed, signed};
 use touchup_document::{document, picture_address, table};
 
 use super::report::{MovedVertices, WhatIfReport};
-use crate::compare::{Displacement, PartView, PicturePanel, PictureParams, Rgb, draw_part};
-use crate::io::png::png_bytes;
-use crate::mesh::TriMesh;
-use crate::sweep::{COVERAGE as K, FeatureChange, JobResult, NumberChange, WhatIf};
+use touchup_features::compare::{
+    Displacement, PartView, PicturePanel, PictureParams, Rgb, draw_part,
+};
+use touchup_geometry::mesh::TriMesh;
+use touchup_io::png::png_bytes;
+use touchup_session::sweep::{COVERAGE as K, FeatureChange, JobResult, NumberChange, WhatIf};
 
 /// Width of a picture, pixels.
 const WIDTH: u32 = 1000;

@@ -7,9 +7,9 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::super::{counted, reported};
-use crate::compare::{Displacement, moved_count};
-use crate::mesh::{TriMesh, VertexId};
-use crate::sweep::{COVERAGE as K, FeatureChange, JobResult, NumberChange, WhatIf};
+use touchup_features::compare::{Displacement, moved_count};
+use touchup_geometry::mesh::{TriMesh, VertexId};
+use touchup_session::sweep::{COVERAGE as K, FeatureChange, JobResult, NumberChange, WhatIf};
 
 /// Output of `--json`.
 #[derive(Debug, Serialize)]

@@ -8,11 +8,11 @@ use super::super::CliError;
 use super::super::pictures::write_coloured;
 use super::page::colour_at;
 use super::report::vertices_of;
-use crate::compare::{Displacement, Rgb};
-use crate::io::mesh_file::{MeshUnit, VertexColumn};
-use crate::io::result_table::ResultTable;
-use crate::mesh::TriMesh;
-use crate::sweep::{COVERAGE as K, JobResult, WhatIf};
+use touchup_features::compare::{Displacement, Rgb};
+use touchup_geometry::mesh::TriMesh;
+use touchup_io::mesh_file::{MeshUnit, VertexColumn};
+use touchup_io::result_table::ResultTable;
+use touchup_session::sweep::{COVERAGE as K, JobResult, WhatIf};
 
 /// Table with a row for each vertex.
 pub(super) fn vertices_table([a, b]: [&JobResult; 2], found: &WhatIf) -> ResultTable {

@@ -72,8 +72,8 @@ fn files_of_a_crate_use_one_another_one_way() {
 
 /// The circles of folders that are still there.
 const FOLDER_CIRCLES: &[&str] = &[
-    "crates/touchup-core/src/reconstruct: contour evidence field incremental",
-    "src/ros/web: connection knowledge page_place page_port replay site",
+    "crates/touchup-method/src/reconstruct: contour evidence field incremental",
+    "crates/touchup-node/src/page: connection knowledge page_place page_port replay site",
 ];
 
 #[test]

@@ -42,8 +42,8 @@ fn names_at<'a>(tokens: &[&'a str], at: usize) -> Vec<&'a str> {
 /// The rooms that `tokens` reach: of other crates by their names, of the own one from its root or
 /// by enough `super`.
 ///
-/// - `depth`, `has_siblings`: of [`Place`].
-fn rooms_reached<'a>(tokens: &[&'a str], depth: usize, has_siblings: bool) -> Vec<&'a str> {
+/// - `depth`: of [`Place`].
+fn rooms_reached<'a>(tokens: &[&'a str], depth: usize) -> Vec<&'a str> {
     let mut rooms = Vec::new();
     for (at, &token) in tokens.iter().enumerate() {
         let behind = match at {
@@ -67,13 +67,9 @@ fn rooms_reached<'a>(tokens: &[&'a str], depth: usize, has_siblings: bool) -> Ve
         } else if token == "super" && !(is_inner && at > 1 && tokens[at - 2] == "super") {
             let pairs = tokens[at..].chunks(2);
             let supers = pairs.take_while(|pair| *pair == ["super", "::"]).count();
-            if depth > 0 && supers + usize::from(has_siblings) >= depth {
+            if depth > 0 && supers >= depth {
                 rooms.extend(names_at(tokens, at + 2 * supers));
             }
-        }
-        // the rooms of `probing`, in a path or in a group
-        if token == "probing" && ["::", "{", ","].contains(&behind) {
-            rooms.extend(names_at(tokens, at + 2));
         }
     }
     rooms
@@ -100,7 +96,7 @@ fn wrong_rooms(source: &Source) -> Vec<String> {
     };
     let is_room = |name: &str| MAY_USE.iter().any(|(room, _)| *room == name);
     let may_use = |name: &str| name == *room || allowed.split(' ').any(|one| one == name);
-    rooms_reached(&source.tokens, place.depth, place.has_siblings)
+    rooms_reached(&source.tokens, place.depth)
         .into_iter()
         .filter(|name| is_room(name) && !may_use(name))
         .map(|name| format!("{file}: {room} may not use {name}"))
@@ -149,34 +145,36 @@ fn every_room_keeps_to_the_flow_of_data() {
     assert!(found.is_empty(), "\n{}", found.join("\n"));
 }
 
-const CORE: &str = "crates/touchup-core/src";
-
-/// A file of the core below its `src`, or a path from the root of the repository.
+/// A file below the `src` of the crate of its room, or a path from the root of the repository.
 fn path_of(file: &str) -> String {
-    if file.starts_with("src/") || file.starts_with("crates/") {
-        file.to_owned()
-    } else {
-        format!("{CORE}/{file}")
-    }
+    let (room, _) = file.split_once('/').unwrap();
+    let package = match room {
+        "mesh" => "geometry",
+        "stylus" | "haptic" | "cellar" => "method",
+        "arm" => "probing",
+        "node" | "ur" => "node",
+        _ => return file.to_owned(),
+    };
+    format!("crates/touchup-{package}/src/{file}")
 }
 
 /// Files, and texts with one breach each.
 const BREACHES: &[(&str, &str)] = &[
-    ("stylus/sync.rs", "use crate::mesh::TriMesh;"),
+    ("stylus/sync.rs", "use touchup_geometry::mesh::TriMesh;"),
     (
         "stylus/sync.rs",
-        "use crate::{mesh::{TriMesh, FaceId}, stylus::Sample};",
+        "use touchup_geometry::{mesh::{TriMesh, FaceId}, numeric::mean};",
     ),
     ("stylus/sync.rs", "fn f() -> crate :: reconstruct::Error {}"),
-    ("stylus/sync.rs", "use super::super::mesh;"),
-    ("stylus/mod.rs", "use super::{stylus, mesh};"),
-    ("mesh.rs", "use super::haptic;"),
-    ("mesh/repair/weld.rs", "use super::super::super::stylus;"),
+    ("stylus/sync.rs", "use super::super::haptic;"),
+    ("stylus/mod.rs", "use super::{stylus, haptic};"),
+    ("mesh/mod.rs", "use super::form;"),
+    ("mesh/repair/weld.rs", "use super::super::super::form;"),
     (
         "crates/touchup-session/src/scene/mod.rs",
         "use crate::live;",
     ),
-    ("src/ros/node/mod.rs", "use crate::cli;"),
+    ("node/mod.rs", "use crate::page::WebServer;"),
     ("haptic/mod.rs", "use std::fs::File;"),
     ("haptic/mod.rs", "use std::{collections::HashMap, thread};"),
     ("haptic/mod.rs", "let t = std::time::Instant::now();"),
@@ -193,26 +191,26 @@ const BREACHES: &[(&str, &str)] = &[
     ("mesh/mod.rs", "fn f<'a>(x: &'a str) { dbg!(x) }"),
     (
         "mesh/mod.rs",
-        "#[cfg(test)] mod tests { fn f() { { } } } use crate::reconstruct;",
+        "#[cfg(test)] mod tests { fn f() { { } } } use crate::form;",
     ),
     ("src/cli/demo.rs", "std::fs::write(path, text)"),
-    ("probing/arm/touching.rs", "use std::thread;"),
-    ("src/ur/client.rs", "use pyo3::Python;"),
+    ("arm/touching.rs", "use std::thread;"),
+    ("ur/client.rs", "use pyo3::Python;"),
     ("src/cli/ur.rs", "pyo3::Python::attach(f)"),
-    ("src/ur/setup.rs", "std::fs::read(path)"),
-    ("src/ur/arm.rs", "use crate::cli::demo;"),
-    ("src/ur/arm.rs", "use crate::sim::Plate;"),
+    ("ur/setup.rs", "std::fs::read(path)"),
+    ("ur/arm.rs", "use crate::ros::port::Port;"),
+    ("ur/arm.rs", "use touchup_sim::Plate;"),
     (
         "crates/touchup-sim/src/arm.rs",
-        "use touchup_core::reconstruct::Patcher;",
+        "use touchup_method::reconstruct::Patcher;",
     ),
     (
         "crates/touchup-sim/src/arm.rs",
-        "use touchup_core::{mesh::TriMesh, align::Motion};",
+        "use touchup_features::{features::Kind, align::Motion};",
     ),
     (
         "crates/touchup-session/src/scene/mod.rs",
-        "fn f() -> touchup_core::features::Kind {}",
+        "fn f() -> touchup_features::features::Kind {}",
     ),
     (
         "crates/touchup-session/src/session/mod.rs",
@@ -234,7 +232,7 @@ fn what_is_allowed_is_let_through() {
     let good = [
         (
             "haptic/mod.rs",
-            "use crate::stylus::Sample; use crate::{mesh::TriMesh, haptic::Update}; use super::mesh;",
+            "use crate::stylus::Sample; use crate::{reconstruct::Patcher, haptic::Update}; use super::stylus;",
         ),
         (
             "stylus/sync.rs",
@@ -246,11 +244,11 @@ fn what_is_allowed_is_let_through() {
         ),
         (
             "stylus/sync.rs",
-            "use super::mesh_like; use super::super::stylus::sync;",
+            "use super::haptic_like; use super::super::stylus::sync;",
         ),
         (
             "mesh/mod.rs",
-            "#[cfg(test)] mod tests { use crate::reconstruct; fn f() { println!(\"}\"); } } fn g() {}",
+            "#[cfg(test)] mod tests { use crate::form; fn f() { println!(\"}\"); } } fn g() {}",
         ),
         (
             "crates/touchup-io/src/lib.rs",
@@ -261,10 +259,10 @@ fn what_is_allowed_is_let_through() {
             "let t = std::time::Instant::now(); println!(\"x\");",
         ),
         (
-            "src/ur/client.rs",
-            "use std::{thread, process}; use std::time::Instant; use crate::probing::arm::ArmError;",
+            "ur/client.rs",
+            "use std::{thread, process}; use std::time::Instant; use touchup_probing::arm::ArmError;",
         ),
-        ("src/ur/child/library.rs", "use pyo3::Python;"),
+        ("ur/child/library.rs", "use pyo3::Python;"),
         ("src/main.rs", "use std::fs; fn main() { println!() }"),
     ];
     for (file, source) in good {

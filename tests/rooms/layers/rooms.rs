@@ -1,8 +1,7 @@
 //! The rooms: where a file belongs, and which other rooms it may use.
 
 /// Each room and the rooms it may use; itself always. A room that is missing here fails the check.
-/// The crates of the simulator, of files, of documents and of the report are a room each. Circles
-/// between crates need no check: cargo refuses them.
+/// A crate of [`WHOLE`] is one room. Circles between crates need no check: cargo refuses them.
 pub const MAY_USE: &[(&str, &str)] = &[
     ("clock", ""),
     ("log_lines", ""),
@@ -52,7 +51,7 @@ pub const MAY_USE: &[(&str, &str)] = &[
     ),
     ("document", ""),
     (
-        "inspection",
+        "inspect",
         "document numeric stylus mesh features conformity align compare io scan scene session",
     ),
     (
@@ -71,23 +70,42 @@ pub const MAY_USE: &[(&str, &str)] = &[
     ("ur", "clock stylus plan arm"),
     (
         "ros",
-        "parameters clock log_lines stylus mesh reconstruct haptic live form features plan arm execute sim align \
-         calibrate compare diagnose io scan scene session replay conformity inspection input_check calibration threads",
+        "parameters clock log_lines stylus reconstruct arm io scene threads",
+    ),
+    (
+        "node",
+        "clock stylus mesh reconstruct haptic live form features plan arm execute sim diagnose io scan scene session \
+         threads ros",
+    ),
+    (
+        "page",
+        "clock stylus mesh reconstruct conformity arm diagnose io inspect input_check calibration scan scene session replay \
+         threads ros node",
     ),
     ("ros2_control", "clock stylus plan arm ros"),
     (
         "cli",
         "clock numeric stylus mesh reconstruct haptic live features conformity plan arm execute sim align \
-         calibrate compare diagnose io threads scan scene session replay refinement sweep document inspection input_check calibration ros \
-         ros2_control ur",
+         calibrate compare diagnose io threads scan scene session replay refinement sweep document inspect input_check calibration ros \
+         node page ros2_control ur",
     ),
 ];
 
 /// Same input, same bytes out: nothing of the world outside comes in.
-pub const PURE: &[&str] = &["touchup-core", "touchup-sim", "touchup-document"];
+pub const PURE: &[&str] = &[
+    "touchup-geometry",
+    "touchup-method",
+    "touchup-features",
+    "touchup-probing",
+    "touchup-sim",
+    "touchup-document",
+];
 
 /// The only places with Python.
-pub const MAY_USE_PYTHON: &[&str] = &["src/ur/child/", "crates/touchup-python/"];
+pub const MAY_USE_PYTHON: &[&str] = &[
+    "crates/touchup-node/src/ur/child/",
+    "crates/touchup-python/",
+];
 
 /// What a pure crate may not name.
 pub const IMPURE_PATHS: &[&str] = &[
@@ -115,8 +133,8 @@ pub const MAY_OPEN_FILES: &[&str] = &["crates/touchup-io/", "crates/touchup-sess
 /// networks, the open sockets, the priority of a thread.
 pub const MAY_ASK_THE_SYSTEM: &[&str] = &[
     "crates/touchup-session/src/threads.rs",
-    "src/ros/dds/answers.rs",
-    "src/ros/dds/sockets.rs",
+    "crates/touchup-node/src/ros/dds/answers.rs",
+    "crates/touchup-node/src/ros/dds/sockets.rs",
 ];
 
 /// Crates that are one room each, as other crates name them, and its name.
@@ -124,12 +142,20 @@ pub const WHOLE: &[(&str, &str)] = &[
     ("touchup_sim", "sim"),
     ("touchup_io", "io"),
     ("touchup_document", "document"),
+    ("touchup_inspect", "inspect"),
     ("touchup_report", "report"),
     ("touchup_python", "python"),
 ];
 
 /// Crates with several rooms, as other crates name them.
-pub const WITH_ROOMS: &[&str] = &["touchup_core", "touchup_session"];
+pub const WITH_ROOMS: &[&str] = &[
+    "touchup_geometry",
+    "touchup_method",
+    "touchup_features",
+    "touchup_probing",
+    "touchup_session",
+    "touchup_node",
+];
 
 /// Where a file is.
 pub struct Place<'a> {
@@ -138,8 +164,6 @@ pub struct Place<'a> {
     pub room: &'a str,
     /// how many modules deep, where the crate has several rooms; 0 where all of it is one
     pub depth: usize,
-    /// whether it is one of the rooms of `probing`
-    pub has_siblings: bool,
 }
 
 impl<'a> Place<'a> {
@@ -149,36 +173,19 @@ impl<'a> Place<'a> {
             Some(file) => file.split_once("/src/").unwrap(),
             None => ("touchup", file.strip_prefix("src/").unwrap()),
         };
-        let name = package.replace('-', "_");
-        if let Some((_, room)) = WHOLE.iter().find(|(whole, _)| *whole == name) {
-            return Self {
-                package,
-                room,
-                depth: 0,
-                has_siblings: false,
-            };
-        }
         let path = path.strip_suffix(".rs").unwrap();
         let path = path.strip_suffix("/mod").unwrap_or(path);
-        if path == "lib" || path == "main" {
-            return Self {
-                package,
-                room: "",
-                depth: 0,
-                has_siblings: false,
-            };
-        }
-        let inner = path.strip_prefix("probing/").unwrap_or(path);
-        let room = if inner == "probing" {
-            ""
-        } else {
-            inner.split('/').next().unwrap()
+        let name = package.replace('-', "_");
+        let whole = WHOLE.iter().find(|(whole, _)| *whole == name);
+        let (room, depth) = match (whole, path) {
+            (Some((_, room)), _) => (*room, 0),
+            (None, "lib" | "main") => ("", 0),
+            (None, _) => (path.split('/').next().unwrap(), path.split('/').count()),
         };
         Self {
             package,
             room,
-            depth: path.split('/').count(),
-            has_siblings: inner != path,
+            depth,
         }
     }
 }

@@ -4,11 +4,11 @@ use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
 use touchup::clock::Clock;
+use touchup::node::ArmKind;
 use touchup::probing::arm::{Arm, ArmError, ArmState, Command, Safety};
 use touchup::ros::messages::{
     Feature, ProbeFeatureRequest, ProbeResult, ProbeSettings, ProbeTouch,
 };
-use touchup::ros::node::ArmKind;
 use touchup::ros::parameters::ParameterValue;
 use touchup::ros::port::{ArmOrder, Arrival, Call, GoalEnd, Publication};
 

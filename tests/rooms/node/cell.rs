@@ -9,6 +9,7 @@ use nalgebra::Isometry3;
 use tempfile::TempDir;
 use touchup::clock::{Clock, ManualClock};
 use touchup::io::mesh_file::{MeshUnit, write_mesh};
+use touchup::node::{ArmKind, ArmOfNode, Node, NodeEnd, Prepared};
 use touchup::probing::arm::{Arm, ArmError, ArmState, Command};
 use touchup::ros::in_process::{OtherParticipants, start};
 use touchup::ros::inbox::inbox;
@@ -16,7 +17,6 @@ use touchup::ros::messages::{
     FlagFeatureRequest, Header, Point, PointStamped, ProbeFeatureRequest, ProbeFeedback, ProbeGoal,
     ProbeResponse, ProbeResult, ProbeSettings,
 };
-use touchup::ros::node::{ArmKind, ArmOfNode, Node, NodeEnd, Prepared};
 use touchup::ros::parameters::{ParameterValue, Parameters};
 use touchup::ros::port::{
     ArmOrder, Arrival, Call, Feedback, Goal, GoalEnd, Publication, Reply, SamplePort,

@@ -1,6 +1,5 @@
 mod arm;
 mod cell;
-mod files;
 mod samples;
 mod stops;
 mod take_out;

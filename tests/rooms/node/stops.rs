@@ -12,12 +12,12 @@ use std::time::{Duration, Instant};
 use nalgebra::Vector3;
 use touchup::clock::Clock;
 use touchup::mesh::TriMesh;
+use touchup::node::{ArmKind, ArmOfNode};
 use touchup::probing::arm::{Arm, ArmError, ArmState, Command};
 use touchup::ros::in_process::OtherParticipants;
 use touchup::ros::messages::{
     Feature, PoseStamped, ProbeResponse, ProbeResult, ProbeSettings, UndoRequest,
 };
-use touchup::ros::node::{ArmKind, ArmOfNode};
 use touchup::ros::parameters::ParameterValue;
 use touchup::ros::port::{Arrival, Call, GoalEnd, Reply};
 use touchup::sim::ArmParams;

@@ -1,8 +1,8 @@
 //! What `generate/` makes of the files that define messages. The expected text is written by hand.
 
-#[path = "../../../generate/definition.rs"]
+#[path = "../../../crates/touchup-node/generate/definition.rs"]
 mod definition;
-#[path = "../../../generate/rust.rs"]
+#[path = "../../../crates/touchup-node/generate/rust.rs"]
 mod rust;
 
 use definition::parse;
@@ -169,12 +169,12 @@ const OF_PAGE: [(&str, &str, bool); 9] = [
     ("ProbeTouch", "msg/msg/ProbeTouch.msg", false),
     (
         "Marker",
-        "src/ros/messages/standard/visualization_msgs/Marker.msg",
+        "crates/touchup-node/src/ros/messages/standard/visualization_msgs/Marker.msg",
         false,
     ),
     (
         "DiagnosticStatus",
-        "src/ros/messages/standard/diagnostic_msgs/DiagnosticStatus.msg",
+        "crates/touchup-node/src/ros/messages/standard/diagnostic_msgs/DiagnosticStatus.msg",
         false,
     ),
 ];

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::Path;
 
 use touchup::scene::Scene;
-use touchup_core::parameters::{Parameter, Section};
+use touchup_method::parameters::{Parameter, Section};
 
 /// Key, unit, default (`-`: left out), smallest, largest.
 const NUMBERS: &str = "

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use nalgebra::Point3;
-use touchup_core::mesh::{Appearance, MeshError, Texture, TriMesh, VertexColours, is_place};
+use touchup_geometry::mesh::{Appearance, MeshError, Texture, TriMesh, VertexColours, is_place};
 
 /// Triangles of a file, with their appearance.
 #[derive(Debug, Default)]

@@ -1,6 +1,6 @@
 //! Further numbers of the vertices of a mesh.
 
-use touchup_core::mesh::VertexColours;
+use touchup_geometry::mesh::VertexColours;
 
 /// One number for each vertex of a mesh, by id; a property of the vertices in a PLY file.
 #[derive(Clone, Debug)]

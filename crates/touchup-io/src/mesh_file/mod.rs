@@ -25,7 +25,7 @@ pub use defect::Defect;
 use defect::Syntax;
 use point_cloud::CloudFormat;
 use soup::Soup;
-use touchup_core::mesh::{
+use touchup_geometry::mesh::{
     Appearance, FARTHEST, MeshError, PointCloud, RepairReport, Texture, TriMesh, is_place, repair,
 };
 pub use unit::{Implausible, LARGEST_M, MeshUnit, SMALLEST_M};

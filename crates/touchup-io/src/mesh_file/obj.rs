@@ -9,7 +9,7 @@ use std::path::Path;
 
 use nalgebra::Point3;
 use tobj::{LoadError, LoadOptions, Material, Model};
-use touchup_core::mesh::VertexColours;
+use touchup_geometry::mesh::VertexColours;
 
 use super::appearance::{PaintedSoup, SoupTexture};
 use super::column::{ColumnValues, VertexColumn};

@@ -1,7 +1,7 @@
 //! Triangles between a file and a mesh.
 
 use nalgebra::Point3;
-use touchup_core::mesh::{TriMesh, triangulate};
+use touchup_geometry::mesh::{TriMesh, triangulate};
 
 use super::defect::{Defect, Syntax};
 use crate::file_error::FilePlace;

@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 
 use nalgebra::Point3;
-use touchup_core::mesh::triangulate;
+use touchup_geometry::mesh::triangulate;
 
 use super::defect::{Defect, Syntax};
 use super::soup::Soup;

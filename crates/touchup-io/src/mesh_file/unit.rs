@@ -5,7 +5,7 @@ use std::fmt;
 use nalgebra::Vector3;
 use serde::Serialize;
 
-use touchup_core::words;
+use touchup_method::words;
 
 /// Smallest diagonal of the bounding box: smaller parts offer nothing to a ball tip of about a
 /// millimetre.

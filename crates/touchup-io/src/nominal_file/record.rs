@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use touchup_core::conformity::ToleranceLimits;
-use touchup_core::features::{InspectedQuantity, Kind};
+use touchup_features::conformity::ToleranceLimits;
+use touchup_features::features::{InspectedQuantity, Kind};
 
 /// A nominal value and its tolerance; lengths in mm, angles in degrees, in the frame of the mesh.
 /// Unstated values are absent.

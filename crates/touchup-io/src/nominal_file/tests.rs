@@ -1,7 +1,7 @@
 use std::fs;
 
 use super::*;
-use touchup_core::conformity::ToleranceLimits;
+use touchup_features::conformity::ToleranceLimits;
 
 fn read(name: &str, text: &str) -> Result<Vec<NominalRecord>, String> {
     let folder = tempfile::tempdir().unwrap();

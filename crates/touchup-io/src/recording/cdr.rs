@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::wire::MAX_MESSAGE_BYTES;
 use super::{BadMessage, RecordingError, ZSTD_MAGIC};
-use touchup_core::stylus::{StampedPose, StampedWrench};
+use touchup_method::stylus::{StampedPose, StampedWrench};
 
 /// Maximum padding of serialized payloads, to four bytes by some middlewares; more means another
 /// type.

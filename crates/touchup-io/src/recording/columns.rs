@@ -4,7 +4,8 @@
 //! the scene may name the column with it. Without names in the scene the usual ones apply, first
 //! those of the RTDE logs of a UR, whose units are known.
 
-use touchup_core::{parameters, words};
+use touchup_method::parameters;
+use touchup_method::words;
 
 use super::units::{Quantity, split_unit};
 

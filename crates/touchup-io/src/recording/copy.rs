@@ -5,7 +5,7 @@ use std::path::Path;
 use super::writer::not_written;
 use super::{Record, RecordingError, RecordingReader, RecordingWriter, Topics};
 use crate::atomic::AtomicFile;
-use touchup_core::stylus::Message;
+use touchup_method::stylus::Message;
 
 /// Frame of messages without one; the same for poses and wrenches, which then share their axes.
 const UNNAMED: &str = "unnamed";

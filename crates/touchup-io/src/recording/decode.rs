@@ -6,7 +6,7 @@ use super::franka::{ArmState, franka_robot_state, franka_state};
 use super::message_type::{MessageFormat, MessageType};
 use super::wire::{Header, MessageFields, WireReader};
 use super::{BadMessage, Record, point_cloud};
-use touchup_core::stylus::{FrameTransform, Message, StampedPose, StampedWrench};
+use touchup_method::stylus::{FrameTransform, Message, StampedPose, StampedWrench};
 
 /// Content of a message.
 pub(super) enum Decoded {

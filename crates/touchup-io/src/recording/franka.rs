@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Matrix3, Rotation3, UnitQuaternion};
 
 use super::BadMessage;
 use super::wire::{Header, MessageFields, Wire};
-use touchup_core::stylus::{StampedPose, StampedWrench};
+use touchup_method::stylus::{StampedPose, StampedWrench};
 
 /// Pose and wrench of one instant, each with its frame.
 #[derive(Debug)]

@@ -10,7 +10,7 @@ use super::number_table::TableRow;
 use super::transforms::TransformChain;
 use super::wire::Wire;
 use super::{BadMessage, FilePlace, RawMessage, Record, StampSource, TopicKind};
-use touchup_core::stylus::Message;
+use touchup_method::stylus::Message;
 
 /// Decodes messages, and counts frames and unusable messages.
 #[derive(Default)]

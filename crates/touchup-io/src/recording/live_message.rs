@@ -9,7 +9,7 @@ use super::layout::TopicKind;
 use super::message_type::{MessageFormat, MessageType};
 use super::wire::{MAX_MESSAGE_BYTES, SequenceFields, Wire};
 use super::{BadMessage, Record};
-use touchup_core::stylus::Message;
+use touchup_method::stylus::Message;
 
 /// Content of a topic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

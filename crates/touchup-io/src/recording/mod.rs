@@ -3,7 +3,7 @@
 //! place of the poses the markers on the stylus (`sensor_msgs/msg/PointCloud2`), read from MCAP,
 //! rosbag2 SQLite files, ROS 1 bags and tables of numbers, written as MCAP.
 //!
-//! Both deal in [`touchup_core::stylus::Message`]s, with the stamps of the message headers.
+//! Both deal in [`touchup_method::stylus::Message`]s, with the stamps of the message headers.
 //! [`RecordingReader`] streams: its memory does not grow with the recording, and it checks every
 //! length in a file before use. [`RecordingWriter`] makes a file that rosbag2, Foxglove and the
 //! Python readers open; [`write_recording`] publishes only whole ones, [`SegmentedWriter`] writes a
@@ -55,7 +55,7 @@ const ZSTD_MAGIC: [u8; 4] = [0x28, 0xb5, 0x2f, 0xfd];
 
 use std::borrow::Cow;
 
-use touchup_core::stylus::{MarkerFrame, Message};
+use touchup_method::stylus::{MarkerFrame, Message};
 
 /// One entry of a recording.
 #[derive(Clone, Debug, PartialEq)]
@@ -90,7 +90,7 @@ impl Record {
     }
 }
 
-touchup_core::names! {
+touchup_method::names! {
     /// Source of a message's time of measurement.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
     pub enum StampSource {

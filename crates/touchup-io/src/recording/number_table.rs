@@ -12,7 +12,7 @@ use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
 use super::columns::{Column, FoundColumns, OrientationColumns, TableColumns, WrenchAxes};
 use super::{BadMessage, Damage, FilePlace, RecordingError};
 use crate::table_rows::{DecimalSign, MAX_ROW_BYTES, RowError, TableRows};
-use touchup_core::stylus::{StampedPose, StampedWrench, Wrench, measured_rotation};
+use touchup_method::stylus::{StampedPose, StampedWrench, Wrench, measured_rotation};
 
 /// Endings of the names of tables.
 const ENDINGS: [&str; 4] = ["csv", "tsv", "txt", "log"];

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use super::cdr::{HeaderMsg, decode, encode};
 use super::{BadMessage, RecordingError};
 use crate::scalar::Scalar;
-use touchup_core::stylus::{MarkerFrame, MarkerObservation};
+use touchup_method::stylus::{MarkerFrame, MarkerObservation};
 
 /// The message definition, with its field type.
 pub(super) const POINT_CLOUD: &str = "std_msgs/Header header\nuint32 height\nuint32 width\n\
@@ -78,7 +78,7 @@ impl CloudField {
 }
 
 /// Reads a cloud of markers: frame and markers, of which the first
-/// [`touchup_core::stylus::MOST_MARKERS`] present count.
+/// [`touchup_method::stylus::MOST_MARKERS`] present count.
 pub(super) fn decode_markers(payload: &[u8]) -> Result<(Cow<'_, str>, MarkerFrame), BadMessage> {
     let msg: PointCloud2Msg = decode(payload)?;
     let mut frame = MarkerFrame::new(msg.header.stamp_ns()?);

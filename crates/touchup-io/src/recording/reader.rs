@@ -11,8 +11,8 @@ use super::intake::Intake;
 use super::number_table::{NumberTable, is_table};
 use super::opening::open_file;
 use super::{BadMessage, Record, RecordingError, RecordingFile, RecordingLayout, StampSource};
-use touchup_core::numeric::counted;
-use touchup_core::stylus::Message;
+use touchup_geometry::numeric::counted;
+use touchup_method::stylus::Message;
 
 mod survey;
 
@@ -33,7 +33,7 @@ const TABLE_FRAMES: [&str; 2] = ["object", "stylus"];
 ///
 /// ```no_run
 /// use touchup_io::recording::{RecordingReader, Topics};
-/// use touchup_core::stylus::Message;
+/// use touchup_method::stylus::Message;
 /// let mut reader = RecordingReader::open("touch.mcap".as_ref(), &Topics::default())?;
 /// let poses = reader.by_ref().filter(|message| matches!(message, Ok(Message::Pose(_)))).count();
 /// println!("{poses} poses in {:?}", reader.pose_frame());

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use super::segments::{FileSegment, METADATA};
 use super::writer::not_written;
 use super::{RecordingError, RecordingReader, SegmentedWriter, Topics, write_recording};
-use touchup_core::stylus::Message;
+use touchup_method::stylus::Message;
 
 impl SegmentedWriter {
     /// Begins a recording in a folder, which is made if missing, in place of an older one.

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use super::writer::not_written;
 use super::{RecordingError, RecordingWriter, TopicKind, Topics};
 use crate::atomic::write_atomically;
-use touchup_core::stylus::Message;
+use touchup_method::stylus::Message;
 
 /// Names the files of a completed recording.
 pub(super) const METADATA: &str = "metadata.yaml";

@@ -9,7 +9,7 @@ use std::path::Path;
 use nalgebra::Isometry3;
 
 use super::{BadMessage, RecordingError, TransformFrames};
-use touchup_core::stylus::{FrameBuffer, FrameTransform, MovingFrame, StampedPose};
+use touchup_method::stylus::{FrameBuffer, FrameTransform, MovingFrame, StampedPose};
 
 /// Frames of a tree: an arm has ten, a plant some hundred.
 const MOST_FRAMES: usize = 10_000;

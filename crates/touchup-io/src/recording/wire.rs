@@ -9,7 +9,7 @@ use serde::Deserialize;
 use serde::de::SeqAccess;
 
 use super::error::BadMessage;
-use touchup_core::stylus::{Wrench, measured_rotation};
+use touchup_method::stylus::{Wrench, measured_rotation};
 
 /// Longest payload of a message: 84 bytes of numbers and a frame name for a pose, some hundred
 /// transforms for a tree of frames.

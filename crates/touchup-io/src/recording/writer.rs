@@ -13,7 +13,7 @@ use super::point_cloud::{POINT_CLOUD, POINT_FIELD, encode_markers};
 use super::{Record, RecordingError, TopicKind, Topics};
 use crate::atomic::AtomicFile;
 use crate::file_error::FileError;
-use touchup_core::stylus::Message;
+use touchup_method::stylus::Message;
 
 /// Separator in message definitions in rosbag2's form: the type, then each type it uses behind a
 /// line of 80 equals signs.

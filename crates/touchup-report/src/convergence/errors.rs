@@ -2,8 +2,8 @@
 
 use nalgebra::Point3;
 
-use touchup_core::compare::angle_between;
-use touchup_core::mesh::TriMesh;
+use touchup_features::compare::angle_between;
+use touchup_geometry::mesh::TriMesh;
 use touchup_sim::Surface;
 
 /// Errors of one mesh against the truth.

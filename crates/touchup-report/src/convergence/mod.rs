@@ -15,8 +15,8 @@ pub use sweeps::{BLOWN_UP, PaperSweeps, RobustSweeps, noisy, raster_samples};
 
 use super::Effort;
 use super::error::{MeasureError, Measured};
-use touchup_core::names;
-use touchup_core::stylus::Sample;
+use touchup_method::names;
+use touchup_method::stylus::Sample;
 use touchup_sim::Peaks;
 
 names! {

@@ -4,7 +4,7 @@
 use nalgebra::{Point3, Vector3};
 
 use crate::error::Measured;
-use touchup_core::haptic::{
+use touchup_method::haptic::{
     DynamicsParams, FaceDynamics, FaceState, RefineError, RefineParams, TipParams,
 };
 use touchup_sim::coupled::GuidedStylus;

@@ -5,9 +5,9 @@ use nalgebra::{Isometry3, Point2, Point3, Vector3};
 
 use super::errors::MeshErrors;
 use crate::error::Measured;
-use touchup_core::haptic::{GuardParams, RefineParams, Refiner, StepRule, TipParams};
-use touchup_core::mesh::TriMesh;
-use touchup_core::stylus::{Sample, Wrench};
+use touchup_geometry::mesh::TriMesh;
+use touchup_method::haptic::{GuardParams, RefineParams, Refiner, StepRule, TipParams};
+use touchup_method::stylus::{Sample, Wrench};
 use touchup_sim::coupled::GuidedStylus;
 use touchup_sim::{
     Lines, Moment, PathParams, Peaks, RasterRegion, SensorParams, StylusParams, Surface,

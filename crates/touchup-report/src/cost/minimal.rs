@@ -3,8 +3,8 @@
 
 use nalgebra::Point3;
 
-use touchup_core::mesh::{FaceId, FaceTree, Nearby, RefitPlan, TriMesh, VertexId};
-use touchup_core::stylus::Sample;
+use touchup_geometry::mesh::{FaceId, FaceTree, Nearby, RefitPlan, TriMesh, VertexId};
+use touchup_method::stylus::Sample;
 use touchup_sim::wavy::{FORCE, RADIUS, STIFFNESS};
 
 /// Share of the mismatch that relaxes per second, 1/s: as in the refiner.

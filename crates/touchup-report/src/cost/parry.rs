@@ -11,8 +11,8 @@ use parry3d_f64::query::PointProjection;
 
 use super::minimal::{REACH, gain};
 use super::stages::touching;
-use touchup_core::mesh::{FaceId, TriMesh, VertexId, triangle};
-use touchup_core::stylus::Sample;
+use touchup_geometry::mesh::{FaceId, TriMesh, VertexId, triangle};
+use touchup_method::stylus::Sample;
 use touchup_sim::wavy::{FORCE, RADIUS};
 
 /// A mesh that follows the ball of [`touchup_sim::wavy`] within one radius of the tip, with the

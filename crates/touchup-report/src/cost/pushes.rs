@@ -7,9 +7,9 @@ use super::minimal::MinimalLoop;
 use super::turns::{PerSample, TimedCase, Timing, by_block, in_turns};
 use crate::error::{MeasureError, Measured};
 use crate::{Spread, timed};
-use touchup_core::haptic::Refiner;
-use touchup_core::mesh::{FaceTree, TriMesh};
-use touchup_core::stylus::{Sample, WrenchFrame};
+use touchup_geometry::mesh::{FaceTree, TriMesh};
+use touchup_method::haptic::Refiner;
+use touchup_method::stylus::{Sample, WrenchFrame};
 use touchup_session::scene::Scene;
 use touchup_sim::wavy::{SIDE, plate, slide_on};
 

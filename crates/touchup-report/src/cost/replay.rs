@@ -6,8 +6,8 @@ use super::pushes::{BAREST, refiner_of, touched_plate};
 use super::turns::spread;
 use crate::error::{MeasureError, Measured};
 use crate::{Spread, timed};
-use touchup_core::stylus::{Message, Sample, StampedPose, StampedWrench, SyncParams};
 use touchup_io::recording::{StampSource, Topics, write_recording};
+use touchup_method::stylus::{Message, Sample, StampedPose, StampedWrench, SyncParams};
 use touchup_session::replay::{Recording, ReplayError, each_sample};
 use touchup_session::scene::Scene;
 

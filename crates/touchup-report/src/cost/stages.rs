@@ -10,15 +10,15 @@ use super::replay::messages;
 use super::turns::{PerSample, TimedCase, Timing, in_turns, spread};
 use crate::error::{MeasureError, Measured};
 use crate::{Spread, timed};
-use touchup_core::features::detect;
-use touchup_core::haptic::{FaceDynamics, FaceState, RefineError};
-use touchup_core::mesh::{FaceId, FaceTree, Nearby, RefitPlan, TriMesh};
-use touchup_core::reconstruct::Patcher;
-use touchup_core::stylus::{
+use touchup_features::features::detect;
+use touchup_geometry::mesh::{FaceId, FaceTree, Nearby, RefitPlan, TriMesh};
+use touchup_io::recording::{RecordingWriter, Topics};
+use touchup_method::haptic::{FaceDynamics, FaceState, RefineError};
+use touchup_method::reconstruct::Patcher;
+use touchup_method::stylus::{
     BiasTracker, Compensator, ContactEstimator, ContactEstimatorParams, ContactGate, ContactSample,
     Sample, Synchroniser, Tip, TipMotion, TipParams, WrenchFrame,
 };
-use touchup_io::recording::{RecordingWriter, Topics};
 use touchup_session::replay::ReplayError;
 use touchup_session::scene::Scene;
 use touchup_sim::wavy::{RADIUS, STIFFNESS};

@@ -1,6 +1,6 @@
 //! Kinds of numbers with a stated uncertainty.
 
-use touchup_core::names;
+use touchup_method::names;
 
 names! {
     /// Kind of a stated number.

@@ -4,8 +4,8 @@ use nalgebra::{Point3, Vector2, Vector3};
 
 use super::kind::CoverageKind;
 use super::stated::StatedNumber;
-use touchup_core::features::{Feature, FittedTo, InspectedQuantity, Kind, Measured};
-use touchup_core::reconstruct::Support;
+use touchup_features::features::{Feature, FittedTo, InspectedQuantity, Kind, Measured};
+use touchup_method::reconstruct::Support;
 use touchup_sim::{Plate, Surface, SurfacePoint, TruthFeature, TruthShape};
 
 /// Largest distance of a surface place at an edge or a rim, m.

@@ -3,7 +3,7 @@
 use nalgebra::{Point3, Vector3};
 
 use super::case::{CaseOutcome, Extreme, refused};
-use touchup_core::haptic::{Along, DynamicsError, DynamicsParams, FaceDynamics, FaceState};
+use touchup_method::haptic::{Along, DynamicsError, DynamicsParams, FaceDynamics, FaceState};
 
 /// The paper's h_min, m, and f_max, N, and α, m/(N·s), and δ.
 const H_MIN: f64 = 0.5e-3;

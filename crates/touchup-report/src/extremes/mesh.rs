@@ -3,9 +3,9 @@
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::case::{CaseOutcome, Extreme, refused};
-use touchup_core::haptic::{RefineError, RefineParams, Refiner, TipParams};
-use touchup_core::mesh::{MeshError, TriMesh};
-use touchup_core::stylus::{Sample, SampleError, Wrench};
+use touchup_geometry::mesh::{MeshError, TriMesh};
+use touchup_method::haptic::{RefineError, RefineParams, Refiner, TipParams};
+use touchup_method::stylus::{Sample, SampleError, Wrench};
 
 /// Longest leg of a triangle, m.
 const EDGE: f64 = 2e-3;

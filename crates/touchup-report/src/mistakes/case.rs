@@ -3,9 +3,9 @@
 
 use super::checked::CheckedRecording;
 use crate::error::Measured;
-use touchup_core::diagnose::{InputFinding, InputMonitor};
-use touchup_core::mesh::FaceTree;
-use touchup_core::stylus::{ContactEstimator, ContactEstimatorParams, Synchroniser, WrenchFrame};
+use touchup_features::diagnose::{InputFinding, InputMonitor};
+use touchup_geometry::mesh::FaceTree;
+use touchup_method::stylus::{ContactEstimator, ContactEstimatorParams, Synchroniser, WrenchFrame};
 use touchup_session::scene::Scene;
 use touchup_sim::{DrawnWorld, InputMistake, Plate, SimWorld, ToldRecording};
 

@@ -1,6 +1,6 @@
 //! A recording and its findings.
 
-use touchup_core::diagnose::InputFinding;
+use touchup_features::diagnose::InputFinding;
 use touchup_sim::{InputMistake, SimWorld};
 
 /// Findings for one recording.

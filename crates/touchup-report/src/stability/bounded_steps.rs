@@ -6,8 +6,8 @@ use rand_pcg::Pcg64;
 
 use super::face_runs::log_uniform;
 use crate::reference::{HeldFace, Reference};
-use touchup_core::haptic::dynamics::RELATIVE_ERROR;
-use touchup_core::haptic::{
+use touchup_method::haptic::dynamics::RELATIVE_ERROR;
+use touchup_method::haptic::{
     Along, ContactModel, DynamicsError, DynamicsParams, FaceDynamics, FaceState, StepRule,
 };
 

@@ -5,8 +5,8 @@ use rand::RngExt;
 use rand_pcg::Pcg64;
 
 use super::integrators::{HeldSample, Integrator};
-use touchup_core::haptic::{ContactModel, DynamicsParams};
-use touchup_core::names;
+use touchup_method::haptic::{ContactModel, DynamicsParams};
+use touchup_method::names;
 
 /// Samples held in each run.
 const STEPS: usize = 6;
@@ -71,7 +71,7 @@ impl FaceRun {
     /// Draws the parameters of a run; `is_spring` selects the linear one of the two contact models.
     /// A spring pulls a tip outside the face, and Eq 7 would turn the face away from the force
     /// there: with a spring the normal turns at a rate of its own, as in
-    /// [`touchup_core::haptic::RefineParams::robust`].
+    /// [`touchup_method::haptic::RefineParams::robust`].
     pub fn draw(rng: &mut Pcg64, is_spring: bool) -> Self {
         let (h_min, f_max) = (log_uniform(rng, H_MIN), log_uniform(rng, F_MAX));
         let model = if is_spring {

@@ -2,9 +2,9 @@
 
 use nalgebra::{Matrix4, Vector3, Vector4};
 
-use touchup_core::haptic::dynamics::{LARGEST_SHARE, turn};
-use touchup_core::haptic::{ContactModel, DynamicsParams, FaceDynamics, FaceState, StepRule};
-use touchup_core::names;
+use touchup_method::haptic::dynamics::{LARGEST_SHARE, turn};
+use touchup_method::haptic::{ContactModel, DynamicsParams, FaceDynamics, FaceState, StepRule};
+use touchup_method::names;
 
 /// Most Newton iterations of the implicit step.
 const NEWTON_STEPS: usize = 50;
@@ -197,7 +197,7 @@ fn implicit_euler(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use touchup_core::haptic::Along;
+    use touchup_method::haptic::Along;
 
     /// A spring from h = 1 mm to rest at 0 without force along n: dh/dt = −h/τ, with known solution
     /// and known discrete steps.

@@ -6,10 +6,10 @@ use rand::RngExt;
 use rand_pcg::Pcg64;
 
 use super::face_runs::{RunEnding, goes_over, log_uniform};
-use touchup_core::haptic::{RefineParams, Refiner, RegionFit, TipParams};
-use touchup_core::mesh::{FaceId, TriMesh};
-use touchup_core::names;
-use touchup_core::stylus::{Sample, Wrench};
+use touchup_geometry::mesh::{FaceId, TriMesh};
+use touchup_method::haptic::{RefineParams, Refiner, RegionFit, TipParams};
+use touchup_method::names;
+use touchup_method::stylus::{Sample, Wrench};
 
 /// Cells along each side of the sheet.
 const CELLS: u32 = 12;

@@ -7,7 +7,7 @@ use rand_pcg::Pcg64;
 
 use super::face_runs::log_uniform;
 use crate::double_double::Double2;
-use touchup_core::haptic::{Along, ContactModel, DynamicsParams, FaceDynamics, FaceState};
+use touchup_method::haptic::{Along, ContactModel, DynamicsParams, FaceDynamics, FaceState};
 
 /// Halvings of the bracket: from 1e9 to below a rounding of the residual.
 const BISECTIONS: usize = 140;

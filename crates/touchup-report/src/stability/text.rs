@@ -6,8 +6,8 @@ use super::{
 };
 use crate::{Axis, Chapter, Drawing, Figure, Panel, Table, TableOf};
 use itertools::Itertools;
-use touchup_core::haptic::GuardParams;
-use touchup_core::haptic::dynamics::RELATIVE_ERROR;
+use touchup_method::haptic::GuardParams;
+use touchup_method::haptic::dynamics::RELATIVE_ERROR;
 
 /// Quantity in the maps.
 const SHARE_OF: &str = "stable runs";

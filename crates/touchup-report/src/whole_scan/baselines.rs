@@ -11,7 +11,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Point3, Vector3};
 
-use touchup_core::mesh::{
+use touchup_geometry::mesh::{
     FaceHit, FaceId, FaceTree, TriMesh, VertexId, pseudo_normal, signed_distance,
 };
 

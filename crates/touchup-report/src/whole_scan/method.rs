@@ -7,9 +7,9 @@ use super::baselines::{ContactSculptor, GaussianParams, GaussianSurface};
 use super::part::{GivenPart, Part};
 use crate::error::Measured;
 use crate::timed;
-use touchup_core::haptic::{RefineParams, RoiSize, StepRule};
-use touchup_core::mesh::{FaceTree, TriMesh};
-use touchup_core::reconstruct::PatcherParams;
+use touchup_geometry::mesh::{FaceTree, TriMesh};
+use touchup_method::haptic::{RefineParams, RoiSize, StepRule};
+use touchup_method::reconstruct::PatcherParams;
 use touchup_session::live::{Engine, Renewal};
 
 /// Standard deviation of a contact point for the Gaussian process, m, as of a good tracking system.

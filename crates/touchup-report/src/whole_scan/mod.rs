@@ -21,8 +21,8 @@ pub use touched_error::TouchedError;
 use super::convergence::straight_line;
 use super::error::Measured;
 use super::{Effort, Spread};
-use touchup_core::compare::CompareError;
-use touchup_core::mesh::TriMesh;
+use touchup_features::compare::CompareError;
+use touchup_geometry::mesh::TriMesh;
 
 /// One method on one scan.
 #[derive(Clone, Debug, PartialEq)]

@@ -6,10 +6,10 @@ use super::touched_error::TouchedError;
 use crate::Effort;
 use crate::convergence::region_over;
 use crate::error::{MeasureError, Measured};
-use touchup_core::compare::{CompareError, TouchedRegion};
-use touchup_core::haptic::TipParams;
-use touchup_core::mesh::{FaceTree, TriMesh};
-use touchup_core::stylus::{
+use touchup_features::compare::{CompareError, TouchedRegion};
+use touchup_geometry::mesh::{FaceTree, TriMesh};
+use touchup_method::haptic::TipParams;
+use touchup_method::stylus::{
     CompensatorParams, ContactEstimator, ContactEstimatorParams, ContactGateParams, Sample,
     SyncParams, Synchroniser,
 };

@@ -1,11 +1,11 @@
 //! Errors of a mesh against the part in the touched region.
 
-use touchup_core::compare::{
+use touchup_features::compare::{
     CompareError, Summary, TouchedRegion, angle_between, closest_places, deviations,
     sample_surface, surface_area,
 };
-use touchup_core::mesh::{Alone, FaceTree, TriMesh};
-use touchup_core::numeric::quantile;
+use touchup_geometry::mesh::{Alone, FaceTree, TriMesh};
+use touchup_geometry::numeric::quantile;
 
 /// Points on the mesh for each m²: four in a square millimetre.
 const DENSITY: f64 = 4e6;

@@ -7,9 +7,9 @@ use nalgebra::{Point3, Vector3};
 use super::problem::{Problem, State};
 use super::rosenbrock;
 use crate::Effort;
-use touchup_core::haptic::dynamics::dormand_prince;
-use touchup_core::haptic::{FaceDynamics, FaceState, StepRule};
-use touchup_core::names;
+use touchup_method::haptic::dynamics::dormand_prince;
+use touchup_method::haptic::{FaceDynamics, FaceState, StepRule};
+use touchup_method::names;
 
 /// A Jacobian has four columns: its cost by differences.
 const JACOBIAN_COUNTS: u64 = 4;

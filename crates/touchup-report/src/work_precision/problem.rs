@@ -8,7 +8,7 @@
 use nalgebra::{Matrix3, Matrix4, Point3, Vector3, Vector4};
 
 use crate::reference::HeldFace;
-use touchup_core::haptic::{Along, ContactModel, DynamicsParams, FaceState, StepRule};
+use touchup_method::haptic::{Along, ContactModel, DynamicsParams, FaceState, StepRule};
 
 /// Travel along n*(0), m, and the normal.
 pub type State = [f64; 4];
@@ -60,7 +60,7 @@ impl Problem {
         [self.h_min_m, 1.0, 1.0, 1.0]
     }
 
-    /// Parameters of [`touchup_core::haptic::FaceDynamics`], with the paper's direction of motion.
+    /// Parameters of [`touchup_method::haptic::FaceDynamics`], with the paper's direction of motion.
     pub fn params(&self, rule: StepRule) -> DynamicsParams {
         DynamicsParams {
             model: ContactModel::Sigmoid {

@@ -1,9 +1,9 @@
 //! The cost of a push in the report: the text from the numbers, and that both sides of the ratio do
 //! the same work.
 
-use touchup_core::haptic::Refiner;
-use touchup_core::mesh::{FaceTree, TriMesh};
-use touchup_core::stylus::WrenchFrame;
+use touchup_geometry::mesh::{FaceTree, TriMesh};
+use touchup_method::haptic::Refiner;
+use touchup_method::stylus::WrenchFrame;
 use touchup_report::allocations::asked;
 use touchup_report::cost::{
     BAREST, Cost, LogLaw, MinimalLoop, ParryLoop, PartCost, PerSample, RecordingCost, ReplaySpeed,

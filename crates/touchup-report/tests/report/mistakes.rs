@@ -1,6 +1,6 @@
 //! Mistakes: what is counted, against cases worked by hand, and a run from end to end.
 
-use touchup_core::diagnose::{InputCause, InputFinding};
+use touchup_features::diagnose::{InputCause, InputFinding};
 use touchup_report::Effort;
 use touchup_report::mistakes::{CheckedRecording, MistakesParams, RightCount, mistakes};
 use touchup_sim::{INPUT_MISTAKES, InputMistake, SimWorld};

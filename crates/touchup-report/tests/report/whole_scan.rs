@@ -2,10 +2,10 @@
 //! errors against cases worked by hand, and one quick run from end to end.
 
 use nalgebra::{Isometry3, Point3, Vector3};
-use touchup_core::compare::TouchedRegion;
-use touchup_core::haptic::TipParams;
-use touchup_core::mesh::{FaceTree, TriMesh, VertexId};
-use touchup_core::stylus::{CompensatorParams, Sample, Wrench};
+use touchup_features::compare::TouchedRegion;
+use touchup_geometry::mesh::{FaceTree, TriMesh, VertexId};
+use touchup_method::haptic::TipParams;
+use touchup_method::stylus::{CompensatorParams, Sample, Wrench};
 use touchup_report::convergence::{
     OneFaceRun, OneFaceSample, Rule, convergence, fit_decay, straight_line,
 };

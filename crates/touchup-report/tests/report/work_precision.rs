@@ -2,7 +2,7 @@
 //! measured by, against closed forms.
 
 use nalgebra::Vector3;
-use touchup_core::haptic::FaceState;
+use touchup_method::haptic::FaceState;
 use touchup_report::document::Report;
 use touchup_report::work_precision::{
     Method, PAPER_H_MIN_M, Problem, SolverSetting, WorkPrecision,

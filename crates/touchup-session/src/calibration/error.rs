@@ -2,10 +2,10 @@
 
 use std::path::PathBuf;
 
-use touchup_core::align::PairsError;
-use touchup_core::calibrate::{PayloadError, TipError};
-use touchup_core::stylus::SettingError;
+use touchup_features::align::PairsError;
+use touchup_features::calibrate::{PayloadError, TipError};
 use touchup_io::table::TableError;
+use touchup_method::stylus::SettingError;
 
 use crate::replay::ReplayError;
 

@@ -2,7 +2,7 @@
 //! settings of a scene.
 //!
 //! `touchup calibrate` prints the results, and the setup on the operator's page shows them; the
-//! equations are in [`touchup_core::calibrate`] and [`touchup_core::align`].
+//! equations are in [`touchup_features::calibrate`] and [`touchup_features::align`].
 
 mod calibrated;
 mod error;

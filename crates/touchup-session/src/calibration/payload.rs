@@ -10,12 +10,12 @@ use std::path::Path;
 
 use nalgebra::Vector3;
 use serde::Serialize;
-use touchup_core::calibrate::{
+use touchup_features::calibrate::{
     PayloadFit, PayloadParams, StaticPose, StaticSegmentFinder, StaticSegmentParams, fit_payload,
 };
-use touchup_core::probing::execute::{NotReached, PayloadReadings};
-use touchup_core::stylus::{Payload, SensorBias, WrenchFrame};
 use touchup_io::static_poses::read_static_poses;
+use touchup_method::stylus::{Payload, SensorBias, WrenchFrame};
+use touchup_probing::execute::{NotReached, PayloadReadings};
 
 use super::calibrated::{Calibrated, Calibration};
 use super::error::CalibrationError;

@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use touchup_core::stylus::{Placement, Sample, WrenchFrame};
 use touchup_io::recording::{RecordingLayout, StampSource};
+use touchup_method::stylus::{Placement, Sample, WrenchFrame};
 
 use crate::replay::{Recording, ReplayError, Replayed, each_sample, marker_filter};
 use crate::scene::Scene;

@@ -4,10 +4,10 @@ use std::fmt;
 use std::path::Path;
 
 use nalgebra::{Isometry3, Vector3, Vector6};
-use touchup_core::align::{PairsFit, PairsParams, PointPair, fit_pairs};
-use touchup_core::calibrate::{DwellFinder, DwellParams};
-use touchup_core::stylus::{ContactEstimator, ContactEstimatorParams};
+use touchup_features::align::{PairsFit, PairsParams, PointPair, fit_pairs};
+use touchup_features::calibrate::{DwellFinder, DwellParams};
 use touchup_io::pairs_file::{PairsFile, read_pairs, read_scan_points};
+use touchup_method::stylus::{ContactEstimator, ContactEstimatorParams};
 
 use super::calibrated::{Calibrated, Calibration};
 use super::error::CalibrationError;

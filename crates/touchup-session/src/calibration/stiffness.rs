@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use touchup_core::probing::execute::Repeatability;
+use touchup_probing::execute::Repeatability;
 
 use super::calibrated::Calibrated;
 use super::vector::rounded;

@@ -4,11 +4,11 @@
 use std::fmt;
 
 use nalgebra::Vector3;
-use touchup_core::calibrate::{
+use touchup_features::calibrate::{
     PlaneTipError, PlaneTipFit, SwingPose, TipFit, TipFitParams, VectorEstimate, fit_tip,
     fit_tip_by_plane,
 };
-use touchup_core::probing::execute::{Cell, NotReached, TipPoses};
+use touchup_probing::execute::{Cell, NotReached, TipPoses};
 
 use super::calibrated::{Calibrated, Calibration};
 use super::error::CalibrationError;

@@ -2,7 +2,7 @@
 
 use std::fmt::{self, Display};
 
-use touchup_core::calibrate::VectorEstimate;
+use touchup_features::calibrate::VectorEstimate;
 
 use crate::reported;
 

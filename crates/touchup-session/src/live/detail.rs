@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use touchup_core::haptic::{RefineParams, Refiner};
-use touchup_core::mesh::{Changes, FaceId, FaceTree, MeshError, Simplified, TriMesh, VertexId};
-use touchup_core::reconstruct::{PatchDelta, Support};
+use touchup_geometry::mesh::{Changes, FaceId, FaceTree, MeshError, Simplified, TriMesh, VertexId};
+use touchup_method::haptic::{RefineParams, Refiner};
+use touchup_method::reconstruct::{PatchDelta, Support};
 
 use super::shown::{Scans, Shown};
 

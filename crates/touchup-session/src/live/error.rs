@@ -1,7 +1,7 @@
 //! Errors of the engine.
 
-use touchup_core::haptic::RefineError;
-use touchup_core::stylus::SettingError;
+use touchup_method::haptic::RefineError;
+use touchup_method::stylus::SettingError;
 
 /// Error of the engine.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

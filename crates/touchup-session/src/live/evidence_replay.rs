@@ -1,7 +1,7 @@
 //! Evidence of samples without a mesh; rebuilding it can leave out samples.
 
-use touchup_core::reconstruct::{Patcher, PatcherParams};
-use touchup_core::stylus::{ContactEstimator, ContactSample, Sample, SampleError, SettingError};
+use touchup_method::reconstruct::{Patcher, PatcherParams};
+use touchup_method::stylus::{ContactEstimator, ContactSample, Sample, SampleError, SettingError};
 
 /// Takes samples like an [`super::Engine`], without moving a mesh.
 #[derive(Clone, Debug)]

@@ -1,6 +1,6 @@
 //! Samples that arrive while the evidence is rebuilt.
 
-use touchup_core::stylus::Sample;
+use touchup_method::stylus::Sample;
 
 /// Maximum number of kept samples: 4 minutes at 1 kHz, 29 MB.
 const MOST_KEPT: usize = 1 << 18;
@@ -54,7 +54,7 @@ impl KeptSamples {
 #[cfg(test)]
 mod tests {
     use nalgebra::{Isometry3, Vector3};
-    use touchup_core::stylus::Wrench;
+    use touchup_method::stylus::Wrench;
 
     use super::*;
 

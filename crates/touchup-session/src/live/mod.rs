@@ -33,10 +33,10 @@ pub use latency::{Latencies, Quantiles};
 pub use probed::TouchDelta;
 use renewals::Renewals;
 pub use renewals::{LiveCounts, Pace};
-use touchup_core::haptic::{Footprint, RefineCounts, RefineError, RefineParams, Refiner, Update};
-use touchup_core::mesh::{Changes, FaceId, FaceTree, TriMesh, VertexId};
-use touchup_core::reconstruct::{Patcher, PatcherParams, Support};
-use touchup_core::stylus::{BiasParams, ContactSample, Sample};
+use touchup_geometry::mesh::{Changes, FaceId, FaceTree, TriMesh, VertexId};
+use touchup_method::haptic::{Footprint, RefineCounts, RefineError, RefineParams, Refiner, Update};
+use touchup_method::reconstruct::{Patcher, PatcherParams, Support};
+use touchup_method::stylus::{BiasParams, ContactSample, Sample};
 use worker::PatchedScans;
 
 /// Schedule of the patch of an [`Engine`].

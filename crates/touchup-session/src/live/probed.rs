@@ -1,6 +1,6 @@
 //! Touches for the measurement of features, from the thread of the patch.
 
-use touchup_core::stylus::ProbedPoint;
+use touchup_method::stylus::ProbedPoint;
 
 /// Changes of a list of touches: the first `kept` stay, `new` follow.
 #[derive(Clone, Debug, PartialEq)]

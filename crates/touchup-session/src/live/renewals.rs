@@ -8,9 +8,9 @@ use super::error::LiveError;
 use super::gate::Gate;
 use super::probed::TouchDelta;
 use super::worker::{PatchedScans, Question, Worker, WorkerAnswer};
-use touchup_core::haptic::Refiner;
-use touchup_core::reconstruct::{PatchDelta, Patcher};
-use touchup_core::stylus::{ContactSample, SettingError};
+use touchup_method::haptic::Refiner;
+use touchup_method::reconstruct::{PatchDelta, Patcher};
+use touchup_method::stylus::{ContactSample, SettingError};
 
 /// Parts of a change of the patch per sample: some 100 µs on a mesh of a million faces.
 const AT_ONCE: usize = 80;

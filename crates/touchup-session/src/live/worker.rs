@@ -10,9 +10,9 @@ use super::gate::Gate;
 use super::probed::{PublishedList, TouchDelta};
 use crate::clock::Working;
 use crate::threads::give_way;
-use touchup_core::mesh::{FaceTree, TriMesh};
-use touchup_core::reconstruct::{PatchDelta, Patcher};
-use touchup_core::stylus::ContactSample;
+use touchup_geometry::mesh::{FaceTree, TriMesh};
+use touchup_method::reconstruct::{PatchDelta, Patcher};
+use touchup_method::stylus::ContactSample;
 
 /// Requests to the thread.
 pub(super) enum Question {

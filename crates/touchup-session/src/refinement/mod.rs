@@ -18,14 +18,14 @@ use crate::scan::{Scan, ScanError, read_scan};
 use crate::scene::{CutScan, RegionCut, Scene, SceneError};
 use crate::session::{OutcomeError, RefinedMesh, StrokeChanges, StrokeReplay};
 use crate::threads::Threads;
-use touchup_core::diagnose::InputFinding;
-use touchup_core::haptic::{Footprint, RefineCounts, RefineError, ScanRegion, Update};
-use touchup_core::mesh::{FaceTree, RepairReport, TriMesh};
-use touchup_core::reconstruct::CloudSummary;
-use touchup_core::stylus::{
+use touchup_features::diagnose::InputFinding;
+use touchup_geometry::mesh::{FaceTree, RepairReport, TriMesh};
+use touchup_io::mesh_file::MeshUnit;
+use touchup_method::haptic::{Footprint, RefineCounts, RefineError, ScanRegion, Update};
+use touchup_method::reconstruct::CloudSummary;
+use touchup_method::stylus::{
     ContactSample, FrictionCoefficient, MarkerFilter, Message, Sample, SettingError, WrenchFrame,
 };
-use touchup_io::mesh_file::MeshUnit;
 
 mod offsets;
 mod pace;

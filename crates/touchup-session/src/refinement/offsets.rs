@@ -4,10 +4,10 @@ use std::fmt;
 
 use nalgebra::Vector6;
 use serde::Serialize;
-use touchup_core::haptic::{
+use touchup_method::haptic::{
     RefineParams, Registrar, Registration, RegistrationError, RegistrationParams,
 };
-use touchup_core::stylus::{ClockEvidence, ClockOffset, ContactSample, SettingError, SyncParams};
+use touchup_method::stylus::{ClockEvidence, ClockOffset, ContactSample, SettingError, SyncParams};
 
 use crate::reported;
 

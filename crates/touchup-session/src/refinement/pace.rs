@@ -4,7 +4,7 @@ use std::fmt;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use touchup_core::numeric::counted;
+use touchup_geometry::numeric::counted;
 
 use crate::live::{Latencies, LiveCounts, Quantiles};
 use crate::reported;

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 use serde::Serialize;
-use touchup_core::diagnose::InputFinding;
-use touchup_core::numeric::counted;
-use touchup_core::stylus::{FrictionCoefficient, MarkerCounts};
+use touchup_features::diagnose::InputFinding;
+use touchup_geometry::numeric::counted;
+use touchup_method::stylus::{FrictionCoefficient, MarkerCounts};
 
 use super::{LiveSummary, ScanOffset, WrenchOffset};
 use crate::live::Quantiles;

@@ -1,8 +1,8 @@
 //! Watches the input of a refinement.
 
-use touchup_core::diagnose::{InputMonitor, InputMonitorParams};
-use touchup_core::haptic::RefineParams;
-use touchup_core::stylus::{ContactEstimator, ContactSample, Sample, SettingError};
+use touchup_features::diagnose::{InputMonitor, InputMonitorParams};
+use touchup_method::haptic::RefineParams;
+use touchup_method::stylus::{ContactEstimator, ContactSample, Sample, SettingError};
 
 /// Watches messages, samples, and decisions on their contact.
 #[derive(Debug)]

@@ -3,13 +3,13 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::path::Path;
 
-use touchup_core::numeric::counted;
-use touchup_core::stylus::{
-    MarkerCounts, MarkerFilter, Message, Placement, Sample, SettingError, SyncParams, Synchroniser,
-    WrenchFrame,
-};
+use touchup_geometry::numeric::counted;
 use touchup_io::recording::{
     Record, RecordingError, RecordingLayout, RecordingReader, StampSource,
+};
+use touchup_method::stylus::{
+    MarkerCounts, MarkerFilter, Message, Placement, Sample, SettingError, SyncParams, Synchroniser,
+    WrenchFrame,
 };
 
 use crate::scene::Scene;

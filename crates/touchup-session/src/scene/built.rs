@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::{Mode, Scene};
 use crate::reported;
-use touchup_core::haptic::Footprint;
+use touchup_method::haptic::Footprint;
 
 /// Parts by their YAML names, in YAML order, then the features of the program.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]

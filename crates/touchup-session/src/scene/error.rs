@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use touchup_core::stylus::SettingError;
 use touchup_io::file_error::FileError;
+use touchup_method::stylus::SettingError;
 
 /// Error of an unusable scene.
 #[derive(Debug, thiserror::Error)]

@@ -2,7 +2,7 @@
 //!
 //! A scene gives differences only: the parts of a right result are active unless the scene says
 //! `off`, as in `patch: off`; parts for some sensors only are active if named. A part without keys
-//! has its defaults. [`touchup_core::parameters!`] declares each parameter once, in its own module;
+//! has its defaults. [`touchup_method::parameters!`] declares each parameter once, in its own module;
 //! `config/default.yaml` is [`Scene::template`] and docs/scene.md is [`Scene::table`].
 
 mod arm_check;
@@ -29,13 +29,13 @@ pub use sections::{
     ScanToSpaceSection, ShapeName, TipSection,
 };
 
-use touchup_core::haptic::{CarveParams, GuardParams, SlidingParams};
-use touchup_core::parameters;
-use touchup_core::reconstruct::{PatchParams, UncertaintyParams};
-use touchup_core::stylus::{BiasParams, ContactGateParams, SyncParams, TipBody};
 use touchup_io::mesh_file::MeshUnit;
 use touchup_io::recording::TableColumns;
 use touchup_io::text_file::read_text;
+use touchup_method::haptic::{CarveParams, GuardParams, SlidingParams};
+use touchup_method::parameters;
+use touchup_method::reconstruct::{PatchParams, UncertaintyParams};
+use touchup_method::stylus::{BiasParams, ContactGateParams, SyncParams, TipBody};
 
 parameters! {
     /// The parts of a scene. `None`: not built. Those with a default are built unless the scene

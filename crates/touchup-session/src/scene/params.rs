@@ -9,16 +9,16 @@ use super::{
     CompensationSection, GravityAxes, Mode, ModelName, PayloadSection, RefineSection, RobotSection,
     ScanToSpaceSection, Scene, TipSection,
 };
-use touchup_core::diagnose::InputMonitorParams;
-use touchup_core::haptic::{ContactModel, RefineParams, RoiSize, TipParams, relaxing_alpha};
-use touchup_core::probing::arm::{ArmGeometry, TouchParams, UrGeometry};
-use touchup_core::probing::execute::{Cell, ProbeParams, Tool};
-use touchup_core::probing::plan::{PatternParams, sigma_of};
-use touchup_core::reconstruct::{PatchParams, PatcherParams, UncertaintyParams};
-use touchup_core::stylus::{
+use touchup_features::diagnose::InputMonitorParams;
+use touchup_method::haptic::{ContactModel, RefineParams, RoiSize, TipParams, relaxing_alpha};
+use touchup_method::reconstruct::{PatchParams, PatcherParams, UncertaintyParams};
+use touchup_method::stylus::{
     CompensatorParams, MarkerFilter, Payload, Placement, SensorBias, SettingError, SyncParams,
     TipBody, TipShape, Wrench, WrenchFrame,
 };
+use touchup_probing::arm::{ArmGeometry, TouchParams, UrGeometry};
+use touchup_probing::execute::{Cell, ProbeParams, Tool};
+use touchup_probing::plan::{PatternParams, sigma_of};
 use touchup_sim::ArmParams;
 
 impl Scene {

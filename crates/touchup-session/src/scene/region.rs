@@ -1,10 +1,10 @@
 //! Region of the scan for all touches: the rest gets no adjacency and no tree.
 
 use super::{Scene, SceneError};
-use touchup_core::haptic::{RefineParams, RoiSize, ScanRegion};
-use touchup_core::mesh::{Outside, Region, TriMesh};
-use touchup_core::reconstruct::PatcherParams;
-use touchup_core::stylus::WrenchFrame;
+use touchup_geometry::mesh::{Outside, Region, TriMesh};
+use touchup_method::haptic::{RefineParams, RoiSize, ScanRegion};
+use touchup_method::reconstruct::PatcherParams;
+use touchup_method::stylus::WrenchFrame;
 
 /// Reach of a touch in the patch, in tip sizes: the fit of the touches reaches two, free space one
 /// more.

@@ -7,16 +7,17 @@ use std::time::SystemTime;
 use nalgebra::{Isometry3, Point3, Quaternion, UnitQuaternion, Vector3};
 
 use super::{CheckRecord, CheckRecordError, CheckStanding};
-use touchup_core::haptic::{Along, ScanParams, SigmoidParams, StepRule, TipParams};
-use touchup_core::probing::arm::{Limits, SerialChain, TouchParams};
-use touchup_core::probing::execute::Tool;
-use touchup_core::probing::plan::{ArmUncertainty, PatternParams};
-use touchup_core::stylus::{
-    MarkerBody, MarkerParams, Payload, SensorBias, SensorMount, SettingError, TipShape, TipSizes,
-};
-use touchup_core::{parameters, words};
 use touchup_io::mesh_file::MeshUnit;
 use touchup_io::urdf::{ArmLinks, UrdfError, read_urdf};
+use touchup_method::haptic::{Along, ScanParams, SigmoidParams, StepRule, TipParams};
+use touchup_method::parameters;
+use touchup_method::stylus::{
+    MarkerBody, MarkerParams, Payload, SensorBias, SensorMount, SettingError, TipShape, TipSizes,
+};
+use touchup_method::words;
+use touchup_probing::arm::{Limits, SerialChain, TouchParams};
+use touchup_probing::execute::Tool;
+use touchup_probing::plan::{ArmUncertainty, PatternParams};
 
 parameters! {
     /// `clock`; it has no keys.

@@ -1,7 +1,7 @@
 //! Texts from the definition of the parameters: the scene with every key explained, and the table
 //! of all keys.
 
-use touchup_core::parameters::{Parameter, Section};
+use touchup_method::parameters::{Parameter, Section};
 
 use super::Scene;
 

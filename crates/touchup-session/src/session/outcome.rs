@@ -12,16 +12,16 @@ use super::outliers::UncertaintySummary;
 use crate::live::EngineResult;
 use crate::reported;
 use crate::scan::carried_over;
-use touchup_core::features::{Detection, detect};
-use touchup_core::mesh::{FaceId, FaceTree, MeshError, Outside, TriMesh, VertexId};
-use touchup_core::numeric::counted;
-use touchup_core::reconstruct::{Patched, Patcher, Support};
-use touchup_core::stylus::ProbedPoint;
+use touchup_features::features::{Detection, detect};
+use touchup_geometry::mesh::{FaceId, FaceTree, MeshError, Outside, TriMesh, VertexId};
+use touchup_geometry::numeric::counted;
 use touchup_io::features_file::FeatureFile;
 use touchup_io::mesh_file::{MeshFile, MeshFileError, MeshUnit, VertexColumn};
 use touchup_io::mesh_file::{read_mesh, write_mesh_with};
 use touchup_io::result_table::{ResultTableError, write_features_as_named, write_touches_as_named};
 use touchup_io::touches_file::as_written;
+use touchup_method::reconstruct::{Patched, Patcher, Support};
+use touchup_method::stylus::ProbedPoint;
 
 /// Error of writing a result.
 #[derive(Debug, thiserror::Error)]

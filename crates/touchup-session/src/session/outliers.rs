@@ -3,8 +3,8 @@
 use std::fmt;
 
 use crate::reported;
-use touchup_core::numeric::counted;
-use touchup_core::reconstruct::{Outlier, Outliers, Patched, Support};
+use touchup_geometry::numeric::counted;
+use touchup_method::reconstruct::{Outlier, Outliers, Patched, Support};
 
 reported! {
     /// Uncertainty in the output of `--json`.

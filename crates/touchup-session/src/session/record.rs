@@ -15,10 +15,10 @@ use serde::{Deserialize, Serialize};
 use super::strokes::{StrokeChange, StrokeChanges};
 use crate::clock::{Clock, locked};
 use crate::threads::give_way;
-use touchup_core::stylus::Message;
 use touchup_io::mesh_file::MeshUnit;
 use touchup_io::recording::{RecordingError, SegmentedWriter, Topics};
 use touchup_io::session_folder::{SessionFolder, fingerprint, read_text};
+use touchup_method::stylus::Message;
 
 const DESCRIPTION: &str = "session.json";
 const SCENE: &str = "scene.yaml";
@@ -436,8 +436,8 @@ mod tests {
     use tempfile::{TempDir, tempdir};
 
     use super::*;
-    use touchup_core::stylus::{StampedWrench, Wrench};
     use touchup_io::recording::RecordingReader;
+    use touchup_method::stylus::{StampedWrench, Wrench};
 
     fn wrench(number: u32) -> Message {
         let wrench = Wrench {

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use touchup_core::reconstruct::StrokeSpan;
-use touchup_core::stylus::{Placement, SyncParams};
 use touchup_io::recording::{RecordingError, StampSource, Topics};
+use touchup_method::reconstruct::StrokeSpan;
+use touchup_method::stylus::{Placement, SyncParams};
 
 use super::strokes::{Exchange, StrokeChanges, StrokeReplay};
 use crate::live::EvidenceReplay;

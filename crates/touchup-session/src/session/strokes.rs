@@ -5,7 +5,7 @@ use std::vec::IntoIter;
 
 use serde::{Deserialize, Serialize};
 
-use touchup_core::reconstruct::StrokeSpan;
+use touchup_method::reconstruct::StrokeSpan;
 
 /// A change of strokes in the record of a session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

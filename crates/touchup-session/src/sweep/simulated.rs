@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 
 use super::error::SweepError;
 use crate::scan::read_scan;
-use touchup_core::mesh::TriMesh;
+use touchup_geometry::mesh::TriMesh;
 use touchup_io::atomic::create_folder;
 use touchup_io::file_error::FileError;
 use touchup_io::mesh_file::{MeshUnit, write_mesh};

@@ -10,12 +10,12 @@ use super::error::SweepError;
 use super::record::{JobRecord, read_record};
 use super::run::{FEATURES, MESH, ResultFiles};
 use crate::threads::Threads;
-use touchup_core::compare::{
+use touchup_features::compare::{
     CompareError, DisplacedFrom, Displacement, IndexedMesh, angle_between, displacements_by_vertex,
     displacements_to_surface,
 };
-use touchup_core::features::InspectedQuantity;
-use touchup_core::mesh::{FaceTree, TriMesh};
+use touchup_features::features::InspectedQuantity;
+use touchup_geometry::mesh::{FaceTree, TriMesh};
 use touchup_io::features_file::{FeatureRecord, read_features};
 use touchup_io::mesh_file::{MeshFile, MeshFileError, read_mesh, read_vertex_columns};
 

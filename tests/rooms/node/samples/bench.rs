@@ -11,13 +11,13 @@ use touchup::clock::{Clock, ManualClock};
 use touchup::io::mesh_file::{MeshUnit, write_mesh};
 use touchup::io::recording::{Topics, write_recording};
 use touchup::mesh::TriMesh;
+use touchup::node::{INBOX, Node, NodeEnd, Prepared};
 use touchup::ros::in_process::{OtherParticipants, start};
 use touchup::ros::inbox::inbox;
 use touchup::ros::messages::{
     Header, MeshPatch, Point, Pose, PoseStamped, Quaternion, Time, Transform, TransformStamped,
     Vector3, Wrench, WrenchStamped,
 };
-use touchup::ros::node::{INBOX, Node, NodeEnd, Prepared};
 use touchup::ros::parameters::{ParameterValue, Parameters};
 use touchup::ros::port::{Arrival, Call, Publication, Reply};
 use touchup::sim::StylusParams;

@@ -1,7 +1,7 @@
 //! Colours and texture coordinates in PLY files.
 
 use nalgebra::Point3;
-use touchup_core::mesh::VertexColours;
+use touchup_geometry::mesh::VertexColours;
 
 use super::super::appearance::{PaintedSoup, SoupTexture};
 use super::super::defect::Syntax;

@@ -7,7 +7,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::super::defect::{Defect, Syntax};
 use crate::file_error::FilePlace;
-use touchup_core::mesh::{PointCloud, ScanStation};
+use touchup_geometry::mesh::{PointCloud, ScanStation};
 
 /// Whether the file begins like E57.
 pub(super) fn is_e57(bytes: &[u8]) -> bool {

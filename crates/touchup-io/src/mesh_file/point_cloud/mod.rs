@@ -9,7 +9,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::defect::Syntax;
 use super::unit::MeshUnit;
-use touchup_core::mesh::{PointCloud, ScanStation};
+use touchup_geometry::mesh::{PointCloud, ScanStation};
 
 /// Kinds of files of points alone.
 #[derive(Clone, Copy)]

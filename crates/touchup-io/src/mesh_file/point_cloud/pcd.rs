@@ -7,7 +7,7 @@ use super::super::text::{NumberedLines, number};
 use super::lzf;
 use crate::file_error::FilePlace;
 use crate::scalar::Scalar;
-use touchup_core::mesh::{PointCloud, ScanStation};
+use touchup_geometry::mesh::{PointCloud, ScanStation};
 
 /// Fields for reading: the position, which is required, and the normal, which is optional.
 const NAMES: [&str; 6] = ["x", "y", "z", "normal_x", "normal_y", "normal_z"];

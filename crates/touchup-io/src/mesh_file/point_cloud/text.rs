@@ -6,7 +6,7 @@ use super::super::defect::{Defect, Syntax};
 use super::super::text::NumberedLines;
 use crate::file_error::FilePlace;
 use crate::table_rows::DecimalSign;
-use touchup_core::mesh::{PointCloud, ScanStation};
+use touchup_geometry::mesh::{PointCloud, ScanStation};
 
 /// Bytes of the shortest line: three digits and their separators.
 const SHORTEST: usize = 6;

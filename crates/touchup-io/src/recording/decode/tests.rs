@@ -1,7 +1,7 @@
 use cdr_encoding::CdrDeserializer;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use serde::de::DeserializeSeed;
-use touchup_core::stylus::Wrench;
+use touchup_method::stylus::Wrench;
 
 use super::super::cdr::{encode_pose, encode_wrench};
 use super::super::layout::TopicKind;

@@ -2,8 +2,8 @@
 
 use std::collections::HashMap;
 
-use touchup_core::mesh::{FaceId, MeshError, TriMesh, VertexId};
-use touchup_core::reconstruct::{Owner, PatchDelta, Support, VertexKey};
+use touchup_geometry::mesh::{FaceId, MeshError, TriMesh, VertexId};
+use touchup_method::reconstruct::{Owner, PatchDelta, Support, VertexKey};
 
 use super::followed::{
     FaceShown, FollowedScan, Scans, VERTICES_OF_A_CHANGE, remove_from, return_to,

@@ -3,11 +3,11 @@
 use std::collections::{HashMap, HashSet};
 
 use super::groups::Groups;
-use touchup_core::haptic::Refiner;
-use touchup_core::mesh::{
+use touchup_geometry::mesh::{
     Changes, FaceId, IdSet, MeshError, Simplified, TriMesh, VertexId, triangle,
 };
-use touchup_core::reconstruct::Support;
+use touchup_method::haptic::Refiner;
+use touchup_method::reconstruct::Support;
 
 /// Approximate number of scan vertices to move per changed vertex of the working mesh.
 pub(super) const VERTICES_OF_A_CHANGE: usize = 8;

@@ -9,9 +9,9 @@ mod groups;
 use at_rest::AtRest;
 use followed::FollowedScan;
 pub(in crate::live) use followed::Scans;
-use touchup_core::haptic::Refiner;
-use touchup_core::mesh::{Changes, FaceId, MeshError, TriMesh, VertexId};
-use touchup_core::reconstruct::{PatchDelta, Support};
+use touchup_geometry::mesh::{Changes, FaceId, MeshError, TriMesh, VertexId};
+use touchup_method::haptic::Refiner;
+use touchup_method::reconstruct::{PatchDelta, Support};
 
 /// The shown mesh.
 #[derive(Debug)]

@@ -1,0 +1,128 @@
+//! Findings about an input: cause, evidence, remedy.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use touchup_method::names;
+
+names! {
+    /// Cause of a faulty recording, in order of repair: each may itself cause the later ones.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+    #[serde(rename_all = "snake_case")]
+    pub enum InputCause {
+        /// All stamps are zero.
+        ZeroStamps = "zero_stamps",
+        /// Unrelated clocks stamp poses and wrenches.
+        TwoEpochs = "two_epochs",
+        /// Stamps in another unit of time.
+        TimeUnit = "time_unit",
+        /// Stamps of one stream go back.
+        StampsGoBack = "stamps_go_back",
+        /// Poses too far apart in time for interpolation.
+        SlowPoses = "slow_poses",
+        /// The messages yield no sample.
+        NoSample = "no_sample",
+        /// No force above the noise.
+        NoContact = "no_contact",
+        /// Too few touched places: they fit almost anywhere.
+        FewContacts = "few_contacts",
+        /// Forces in another unit.
+        ForceUnit = "force_unit",
+        /// Contact forces below the contact threshold.
+        LightTouch = "light_touch",
+        /// Force steps too coarse for the contact decision.
+        ForceSteps = "force_steps",
+        /// Poses, scan or radius in another unit of length.
+        LengthUnit = "length_unit",
+        /// Position axes swapped or mirrored.
+        PositionAxes = "position_axes",
+        /// Quaternion components in another order.
+        QuaternionOrder = "quaternion_order",
+        /// Scan faces inside out.
+        InsideOut = "inside_out",
+        /// Reversed wrench: the stylus acts on the part.
+        WrenchSign = "wrench_sign",
+        /// Wrench in axes other than those assumed.
+        WrenchFrame = "wrench_frame",
+        /// Wrench stamps later or earlier than the pose of the same instant.
+        Delay = "delay",
+        /// Contacts off the scan.
+        Frame = "frame",
+        /// Distance from ball centre to surface differs from the tip radius.
+        Radius = "radius",
+        /// The stylus bends more or less than its stiffness predicts.
+        Stiffness = "stiffness",
+        /// Forces clipped at one value.
+        Saturation = "saturation",
+        /// Nonzero force in free motion.
+        Tare = "tare",
+    }
+}
+
+impl InputCause {
+    /// Whether the contacts' fit to the scan shows it: uncertain if the scan lacks touched surface.
+    pub fn is_read_off_the_scan(self) -> bool {
+        match self {
+            Self::LengthUnit
+            | Self::PositionAxes
+            | Self::Frame
+            | Self::Radius
+            | Self::Stiffness
+            | Self::InsideOut
+            | Self::WrenchSign
+            | Self::WrenchFrame
+            | Self::QuaternionOrder => true,
+            Self::ZeroStamps
+            | Self::TwoEpochs
+            | Self::TimeUnit
+            | Self::StampsGoBack
+            | Self::SlowPoses
+            | Self::Delay
+            | Self::NoSample
+            | Self::NoContact
+            | Self::FewContacts
+            | Self::Tare
+            | Self::ForceUnit
+            | Self::LightTouch
+            | Self::ForceSteps
+            | Self::Saturation => false,
+        }
+    }
+}
+
+/// A doubt about the input, with its measurement and remedy.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct InputFinding {
+    /// cause
+    pub cause: InputCause,
+    /// only a mistake explains it; results of such an input are not trustworthy
+    pub is_sure: bool,
+    /// measurement, with units
+    pub measured: String,
+    /// remedy
+    pub remedy: &'static str,
+}
+
+impl InputFinding {
+    pub(super) fn new(
+        cause: InputCause,
+        is_sure: bool,
+        measured: String,
+        remedy: &'static str,
+    ) -> Self {
+        Self {
+            cause,
+            is_sure,
+            measured,
+            remedy,
+        }
+    }
+}
+
+impl fmt::Display for InputFinding {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let how_sure = if self.is_sure { "" } else { "perhaps: " };
+        write!(f, "{how_sure}{}; {}", self.measured, self.remedy)
+    }
+}

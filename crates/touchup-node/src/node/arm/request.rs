@@ -1,0 +1,123 @@
+//! Content of a request, within the configured limits.
+
+use crate::ros::messages::{ProbeResult, ProbeSettings};
+use touchup_features::features::Kind;
+use touchup_probing::arm::{CRAWL, Narrower};
+use touchup_probing::execute::ProbeParams;
+use touchup_probing::plan::{Quantity, sigma_of};
+
+/// Settings of a probing.
+pub struct Wanted {
+    /// configured parameters, narrowed
+    pub params: ProbeParams,
+    /// only plan
+    pub is_dry_run: bool,
+}
+
+/// Confidence of a tolerance without one.
+const CONFIDENCE: f64 = 0.95;
+
+impl Wanted {
+    /// Reads settings; 0 means as configured.
+    ///
+    /// # Errors
+    /// A code of [`ProbeResult`] and the reason.
+    #[expect(clippy::too_many_lines)]
+    pub fn of(
+        settings: &ProbeSettings,
+        configured: &ProbeParams,
+        kind: Option<Kind>,
+    ) -> Result<Self, (u8, String)> {
+        let bad = |why: String| (ProbeResult::BAD_REQUEST, why);
+        let some = |asked: f64| (asked != 0.0).then_some(asked);
+        let by = Narrower {
+            force: some(settings.max_force),
+            search: some(settings.max_search_travel),
+            time: some(settings.max_duration),
+            speed: None,
+        };
+        let mut params = configured
+            .narrowed(&by)
+            .map_err(|why| bad(why.to_string()))?;
+        for (what, asked, speed) in [
+            (
+                "max_search_speed",
+                settings.max_search_speed,
+                &mut params.touch.search_speed,
+            ),
+            (
+                "max_link_speed",
+                settings.max_link_speed,
+                &mut params.touch.link_speed,
+            ),
+        ] {
+            match some(asked) {
+                None => {}
+                Some(asked) if asked >= CRAWL && asked <= *speed => *speed = asked,
+                Some(asked) => {
+                    let range = format!("from {CRAWL} m/s to the configured {speed} m/s");
+                    return Err(bad(format!("{what} of {asked} m/s: it may be {range}")));
+                }
+            }
+        }
+        params.pattern.quantity = match settings.quantity {
+            ProbeSettings::QUANTITY_ALL => Quantity::All,
+            ProbeSettings::QUANTITY_POSITION => Quantity::Position,
+            ProbeSettings::QUANTITY_AXIS => Quantity::Axis,
+            ProbeSettings::QUANTITY_DIAMETER => Quantity::Diameter,
+            ProbeSettings::QUANTITY_LENGTH => Quantity::Length,
+            ProbeSettings::QUANTITY_WIDTH => Quantity::Width,
+            other => {
+                return Err(bad(format!(
+                    "touches cannot be chosen for quantity {other}"
+                )));
+            }
+        };
+        if !params.pattern.quantity.is_of(kind) {
+            let kind = kind.map_or("unknown region", Kind::name);
+            return Err(bad(format!(
+                "a {kind} has no {}",
+                params.pattern.quantity.name()
+            )));
+        }
+        match settings.pattern {
+            ProbeSettings::PATTERN_TOUCHES => {}
+            ProbeSettings::PATTERN_SLIDE => params.slides = true,
+            other => return Err(bad(format!("there is no pattern {other}"))),
+        }
+        params.pattern.sigma = sigma(settings, params.pattern.sigma).map_err(bad)?;
+        if settings.max_touches != 0 {
+            let (asked, most) = (settings.max_touches as usize, params.pattern.budget);
+            if asked > most {
+                return Err(bad(format!(
+                    "max_touches of {asked}: it may be up to the configured {most}"
+                )));
+            }
+            params.pattern.budget = asked;
+        }
+        Ok(Self {
+            params,
+            is_dry_run: settings.dry_run,
+        })
+    }
+}
+
+/// Requested standard deviation, m or rad.
+fn sigma(settings: &ProbeSettings, configured: f64) -> Result<f64, String> {
+    let confidence = if settings.confidence == 0.0 {
+        CONFIDENCE
+    } else {
+        settings.confidence
+    };
+    match (settings.tolerance, confidence) {
+        (_, p) if !(p > 0.0 && p < 1.0) => {
+            Err(format!("confidence is {p}: it must be above 0 and below 1"))
+        }
+        (0.0, _) if settings.quantity == ProbeSettings::QUANTITY_AXIS => {
+            Err("an axis needs a tolerance of its own, rad".to_owned())
+        }
+        (0.0, _) => Ok(configured),
+        (tolerance, p) if tolerance > 0.0 && tolerance.is_finite() => Ok(sigma_of(tolerance, p)),
+        (tolerance, _) => Err(format!("tolerance is {tolerance}: it must be above 0")),
+    }
+}

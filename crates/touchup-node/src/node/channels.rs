@@ -1,0 +1,89 @@
+//! Messages between the workers.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::sync::mpsc::SyncSender;
+
+use nalgebra::Point3;
+
+use super::replica::{Edits, MeshVersion};
+use super::variances::Variances;
+use crate::ros::messages::{
+    DetectFeaturesRequest, DetectFeaturesResponse, DiagnosticArray, FeatureArray,
+    FlagFeatureResponse, UnflagFeatureResponse,
+};
+use crate::ros::port::Reply;
+use touchup_features::features::Feature;
+use touchup_probing::execute::Flag;
+use touchup_probing::plan::NextTouch;
+use touchup_session::live::TouchDelta;
+
+/// Input of the view.
+pub enum ViewInput {
+    /// a change of the mesh
+    Edits(Box<Edits>),
+    /// variances of vertices
+    Variances(Variances),
+    /// a new session
+    Session(Box<MeshVersion>),
+    /// a touched face and its signed distance, m; only with tiles coloured by mismatch
+    Mismatch(u32, f64),
+    /// position of the tip
+    Tip(LastTip),
+    /// all features, and the next touches by hand
+    Features(Arc<FeatureArray>, NextTouches),
+    /// a request for the whole state on the topic
+    Resync,
+    /// diagnostics, once a second
+    Diagnostics(Box<DiagnosticArray>),
+    /// a changed parameter
+    Parameters,
+}
+
+/// Last position of the tip.
+#[derive(Clone, Copy, Debug)]
+pub struct LastTip {
+    /// stamp of the sample, ns
+    pub stamp_ns: i64,
+    /// centre of the ball, m, in O
+    pub centre: Point3<f64>,
+    /// radius of the ball, m
+    pub radius: f64,
+    /// the closest point of the mesh, and its distance from the ball's surface, m; `None` beyond
+    /// the reach
+    pub closest: Option<(Point3<f64>, f64)>,
+}
+
+/// Input of the feature worker.
+pub enum FeatureInput {
+    /// new or removed touches
+    Probed(TouchDelta),
+    /// a new session
+    Session(String),
+    /// a flag without a number yet
+    Flag(Flag, Option<Reply<FlagFeatureResponse>>),
+    /// removal of a flag
+    Unflag(u32, Reply<UnflagFeatureResponse>),
+    /// request for features to probe; no numbers: all flagged ones
+    Targets(Vec<u32>, SyncSender<Vec<Flag>>),
+    /// a measurement of an arm
+    Measured(Box<ArmMeasurement>),
+    /// request for a detection on the current mesh
+    Detect(DetectFeaturesRequest, Reply<DetectFeaturesResponse>),
+}
+
+/// A feature measured by an arm.
+#[derive(Clone, Debug)]
+pub struct ArmMeasurement {
+    /// session of the flag
+    pub session: String,
+    /// number of the flag
+    pub id: u32,
+    /// measured feature
+    pub feature: Feature,
+    /// the requested accuracy is reached
+    pub is_done: bool,
+}
+
+/// Next touches by hand, by the number of the feature.
+pub type NextTouches = BTreeMap<u32, NextTouch>;

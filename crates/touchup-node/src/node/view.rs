@@ -1,0 +1,221 @@
+//! The view thread: it follows the mesh, and sends tiles, changes, markers and diagnostics at its
+//! own pace.
+
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender};
+use std::time::Duration;
+
+use super::channels::{LastTip, NextTouches, ViewInput};
+use super::feature_messages;
+use super::mesh_patches::MeshPatches;
+use super::replica::Edits;
+use super::shared::Shared;
+use super::tiles::{ColourBy, Tiles};
+use super::tip;
+use crate::ros::messages::{FeatureArray, MeshPatch};
+use crate::ros::port::{Port, Publication, TILES_KEPT};
+use touchup_session::clock::Clock;
+
+/// Maximum number of tiles waiting in the port: tiles waiting here are drawn at the time of
+/// sending, changed ones first.
+const TILES_AHEAD: usize = 32;
+/// Maximum number of parts of the whole state per period: 2.4 MB.
+const PARTS_AT_ONCE: usize = 64;
+/// Period while there is more to send.
+const CATCH_UP: Duration = Duration::from_millis(10);
+
+/// State of the view thread.
+pub struct View {
+    clock: Clock,
+    port: Arc<dyn Port>,
+    shared: Arc<Shared>,
+    /// returns change lists for filling
+    spare: SyncSender<Box<Edits>>,
+    tiles: Tiles,
+    patches: MeshPatches,
+    colour_by: ColourBy,
+    whole: Option<Box<dyn Iterator<Item = MeshPatch> + Send>>,
+    asked_whole: bool,
+    tip: Option<LastTip>,
+    features: Arc<FeatureArray>,
+    next: NextTouches,
+}
+
+impl View {
+    /// Before the first publication.
+    pub fn new(
+        clock: Clock,
+        port: Arc<dyn Port>,
+        shared: Arc<Shared>,
+        spare: SyncSender<Box<Edits>>,
+    ) -> Self {
+        let (replica, _) = shared.mesh.now();
+        Self {
+            clock,
+            tiles: Tiles::all_of(&replica),
+            patches: MeshPatches::of(&replica, shared.scan_sigma),
+            colour_by: colour_by(&shared),
+            whole: None,
+            asked_whole: false,
+            tip: None,
+            features: Arc::default(),
+            next: NextTouches::new(),
+            port,
+            shared,
+            spare,
+        }
+    }
+
+    /// Runs until all senders are gone, then publishes the rest.
+    pub fn run(mut self, inputs: &Receiver<ViewInput>) {
+        let mut due = self.clock.now();
+        loop {
+            match self
+                .clock
+                .recv_timeout(inputs, due.saturating_duration_since(self.clock.now()))
+            {
+                Ok(input) => self.take(input),
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => break,
+            }
+            if self.clock.now() >= due {
+                // ids fit each other only after a complete change
+                let period =
+                    Duration::from_secs_f64(1.0 / self.shared.parameters().double("view_rate_hz"));
+                due = self.clock.now()
+                    + if self.tick(false) {
+                        period.min(CATCH_UP)
+                    } else {
+                        period
+                    };
+            }
+        }
+        self.tick(true);
+        // nobody moves the tip any more
+        self.port
+            .publish(Publication::Tip(tip::no_markers(&self.shared.frame)));
+        self.shared.mesh.close();
+    }
+
+    fn take(&mut self, input: ViewInput) {
+        match input {
+            ViewInput::Edits(edits) => {
+                self.patches.note(&edits, &self.shared.mesh.apply(&edits));
+                edits.tiles.iter().for_each(|&tile| self.tiles.note(tile));
+                edits
+                    .faces
+                    .iter()
+                    .for_each(|(face, _)| self.tiles.forget_mismatch(*face));
+                // the channel has room for all lists
+                let _ = self.spare.try_send(edits);
+            }
+            ViewInput::Variances(variances) => {
+                self.patches
+                    .note_vertices(self.shared.mesh.apply_variances(&variances));
+            }
+            ViewInput::Session(replica) => {
+                self.tiles.restart(&replica);
+                self.patches = MeshPatches::of(&replica, self.shared.scan_sigma);
+                self.shared.mesh.begin_session(*replica);
+                // followers would see the new session only at the next change, so the whole state
+                // goes out
+                (self.whole, self.asked_whole) = (None, true);
+            }
+            ViewInput::Mismatch(face, distance) => {
+                self.tiles
+                    .note_mismatch(face, distance, &self.shared.mesh.now().0);
+            }
+            ViewInput::Tip(tip) => self.tip = Some(tip),
+            ViewInput::Features(features, next) => {
+                self.port
+                    .publish(Publication::Features((*features).clone()));
+                self.port
+                    .publish(Publication::FeatureMarkers(feature_messages::markers(
+                        &features,
+                    )));
+                (self.features, self.next) = (features, next);
+            }
+            ViewInput::Resync => self.asked_whole = true,
+            ViewInput::Diagnostics(diagnostics) => {
+                self.port.publish(Publication::Diagnostics(*diagnostics))
+            }
+            ViewInput::Parameters => {
+                let by = colour_by(&self.shared);
+                if std::mem::replace(&mut self.colour_by, by) != by {
+                    self.tiles.renew(&self.shared.mesh.now().0);
+                }
+            }
+        }
+    }
+
+    /// Sends due publications; returns whether there is more.
+    ///
+    /// - `is_last`: passes all tiles to the port.
+    fn tick(&mut self, is_last: bool) -> bool {
+        let frame = self.shared.frame.as_str();
+        if let Some(tip) = self.tip.take() {
+            self.port.publish(Publication::Tip(tip::markers(
+                &tip,
+                &self.features,
+                &self.next,
+                frame,
+            )));
+        }
+        let (replica, is_complete) = self.shared.mesh.now();
+        if !is_complete {
+            return true;
+        }
+        for part in self.patches.change(&replica, frame) {
+            self.port.publish(Publication::MeshPatch(part));
+        }
+        if self.whole.is_none() && std::mem::take(&mut self.asked_whole) {
+            // the next change starts from the state sent last
+            self.whole = Some(Box::new(
+                self.patches.whole(Arc::clone(&replica), frame.to_owned()),
+            ));
+        }
+        if let Some(whole) = &mut self.whole {
+            let parts = whole.by_ref().take(PARTS_AT_ONCE);
+            if parts
+                .map(|part| self.port.publish(Publication::MeshPatch(part)))
+                .count()
+                < PARTS_AT_ONCE
+            {
+                self.whole = None;
+            }
+        }
+        if self.shared.has_new_viewer.swap(false, Ordering::Relaxed) {
+            self.tiles.renew_older_than(TILES_KEPT as u64);
+        }
+        let now = self.clock.now();
+        self.tiles.renew_settled(now);
+        let Self {
+            tiles,
+            colour_by,
+            port,
+            ..
+        } = self;
+        // tiles wait until there is a viewer
+        let is_seen = self.shared.viewers.load(Ordering::Relaxed) > 0;
+        let most = match (is_last, is_seen) {
+            (_, false) => 0,
+            (true, true) => usize::MAX,
+            (false, true) => TILES_AHEAD.saturating_sub(port.tiles_waiting()),
+        };
+        tiles.take(most, now, &replica, (*colour_by, frame), |tile| {
+            port.publish(Publication::Tile(tile))
+        });
+        let waiting = if is_seen { self.tiles.waiting() } else { 0 };
+        self.shared.tiles_waiting.store(waiting, Ordering::Relaxed);
+        waiting > 0 || self.whole.is_some() || self.asked_whole
+    }
+}
+
+/// Colouring by the parameter of this name.
+pub(super) fn colour_by(shared: &Shared) -> ColourBy {
+    match shared.parameters().string("colour_by") {
+        "mismatch" => ColourBy::Mismatch,
+        _ => ColourBy::Touched,
+    }
+}

@@ -1,0 +1,241 @@
+//! Player of a session: reads it, starts a node for it, sends its messages, and ends both when no
+//! page follows.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::AtomicUsize;
+
+use tokio::runtime::Handle;
+use tokio::sync::watch;
+
+use super::control::ReplayControl;
+use super::progress::ReplayNext;
+use super::recording::SessionRecording;
+use crate::node::{Node, Prepared, ReplayedSession};
+use crate::page::annotations::Annotations;
+use crate::page::board::Board;
+use crate::page::calls::Calls;
+use crate::page::entrance::Entrance;
+use crate::page::knowledge;
+use crate::page::page_port::PagePort;
+use crate::page::report_work::Reports;
+use crate::page::site::{ScanShown, Site};
+use crate::ros::in_process::{self, OtherParticipants};
+use crate::ros::inbox::{Inbox, inbox};
+use crate::ros::parameters::CELL_FRAME;
+use crate::ros::parameters::{ParameterValue, Parameters};
+use crate::ros::port::{Arrival, ReplayStep, SamplePort};
+use crate::ros::{as_pose, as_wrench};
+use touchup_io::session_folder::SessionFolder;
+use touchup_method::stylus::Message;
+use touchup_session::clock::Clock;
+use touchup_session::session::SessionRecord;
+
+/// Maximum number of queued messages: pauses and jumps take effect after them.
+const INBOX: usize = 256;
+/// Reason of the end if the node is gone.
+const ENDED: &str =
+    "the replay ended by a fault of touchup: please report it with the session's folder";
+
+/// Content of a replay once open, or the reason of its failure.
+pub(super) type OpenedReplay = Option<Result<Arc<Site>, String>>;
+
+/// Inputs of a replay.
+pub(super) struct Player {
+    pub folder: SessionFolder,
+    /// parent of the session folders
+    pub session_folder: PathBuf,
+    pub entrance: Arc<Entrance>,
+    pub control: Arc<ReplayControl>,
+    pub runtime: Handle,
+    pub opened: watch::Sender<OpenedReplay>,
+}
+
+/// A running replay.
+struct ReplayStage {
+    recording: SessionRecording,
+    site: Arc<Site>,
+    inbox: Inbox,
+    stylus: OtherParticipants,
+    node: Node,
+}
+
+impl Player {
+    /// Plays until no page follows.
+    pub fn run(self) {
+        let Self {
+            control,
+            runtime,
+            opened,
+            ..
+        } = &self;
+        let ReplayStage {
+            recording,
+            site,
+            inbox,
+            stylus,
+            node,
+        } = match self.open() {
+            Ok(stage) => stage,
+            Err(why) => return drop(opened.send_replace(Some(Err(why)))),
+        };
+        let known = runtime.spawn(knowledge::follow(Arc::clone(&site)));
+        opened.send_replace(Some(Ok(site)));
+        if let Err(why) = play(&recording, control, &stylus) {
+            control.fail(why);
+        }
+        known.abort();
+        inbox.put(Arrival::Shutdown);
+        if let Err(error) = node.join() {
+            tracing::warn!(%error, session = control.session(), "a replay ended by a fault");
+        }
+    }
+
+    /// Reads the session, and starts its node.
+    #[expect(clippy::too_many_lines)]
+    fn open(&self) -> Result<ReplayStage, String> {
+        let Self {
+            folder,
+            session_folder,
+            entrance,
+            control,
+            ..
+        } = self;
+        let record = SessionRecord::open(folder.path()).map_err(|error| error.to_string())?;
+        let SessionRecord {
+            scan,
+            mesh_unit,
+            scene,
+            recording,
+            topics,
+            ..
+        } = record;
+        let source = if topics.pose.starts_with("/probe/") {
+            "probe"
+        } else {
+            "stylus"
+        };
+        let read = SessionRecording::read(recording.clone(), topics.clone(), source, || {
+            !control.is_closed()
+        });
+        let readable =
+            read.map_err(|error| format!("the recording cannot be replayed: {error}"))?;
+        // for a running session: read after its messages, so that no undo before one of them is
+        // missing
+        let changes =
+            SessionRecord::strokes_of(folder.path()).map_err(|error| error.to_string())?;
+        let parameters = [
+            ("scene", path(&scene)?),
+            ("scan", path(&scan)?),
+            (
+                "mesh_unit",
+                ParameterValue::String(mesh_unit.name().to_owned()),
+            ),
+            ("source", ParameterValue::String(source.to_owned())),
+        ];
+        let mut all = Parameters::default();
+        for (name, value) in parameters {
+            all.set(name, &value).map_err(|error| error.to_string())?;
+        }
+        let ready = Prepared::replayed(
+            all,
+            folder.clone(),
+            ReplayedSession::new(recording, topics, changes),
+        )
+        .map_err(|error| error.to_string())?;
+        let clock = Clock::system();
+        let (inbox, arrivals) = inbox(INBOX, &clock);
+        let (network, stylus) = in_process::start_unread(inbox.clone(), &clock);
+        let scan_mesh = ready.scan_mesh();
+        let file = scan
+            .file_name()
+            .map(|name| name.to_string_lossy().into_owned())
+            .unwrap_or_default();
+        let site = Arc::new(Site {
+            board: Board::new(ready.whole_mesh()),
+            calls: Calls::new(&inbox).map_err(|error| error.to_string())?,
+            inbox: inbox.clone(),
+            entrance: Arc::clone(entrance),
+            // none are read: a replay detects features anew, perhaps with other numbers
+            annotations: Annotations::new(session_folder),
+            nominal: None,
+            reports: Reports::new(None, mesh_unit),
+            scan: ScanShown {
+                file,
+                faces: scan_mesh.0.face_count(),
+                is_size_confirmed: true,
+            },
+            scan_mesh,
+            session_folder: session_folder.clone(),
+            pages: AtomicUsize::new(0),
+            replay: Some(Arc::clone(control)),
+        });
+        let port = Arc::new(PagePort {
+            network,
+            site: Arc::clone(&site),
+        });
+        let node = ready
+            .start(port, arrivals, None)
+            .map_err(|error| error.to_string())?;
+        control.begin(readable.end_ns, readable.damage.clone());
+        Ok(ReplayStage {
+            recording: readable,
+            site,
+            inbox,
+            stylus,
+            node,
+        })
+    }
+}
+
+/// A path as a parameter of a node.
+fn path(path: &Path) -> Result<ParameterValue, String> {
+    let text = path
+        .to_str()
+        .ok_or_else(|| format!("{}: parameters of ROS are UTF-8, rename it", path.display()))?;
+    Ok(ParameterValue::String(text.to_owned()))
+}
+
+/// Plays from the beginning, and again on request, until no page follows.
+fn play(
+    recording: &SessionRecording,
+    control: &ReplayControl,
+    stylus: &OtherParticipants,
+) -> Result<(), String> {
+    while play_once(recording, control, stylus)? == ReplayNext::Again {
+        step(ReplayStep::Again, stylus)?;
+    }
+    Ok(())
+}
+
+fn play_once(
+    recording: &SessionRecording,
+    control: &ReplayControl,
+    stylus: &OtherParticipants,
+) -> Result<ReplayNext, String> {
+    for timed in recording.messages().map_err(|error| error.to_string())? {
+        let (at_ns, message) = timed.map_err(|error| error.to_string())?;
+        match control.wait_for(at_ns) {
+            ReplayNext::Go => {}
+            next => return Ok(next),
+        }
+        let is_taken = match &message {
+            Message::Wrench(wrench) => {
+                stylus.publish_wrench(as_wrench(wrench, &recording.wrench_frame))
+            }
+            Message::Pose(pose) => stylus.publish_pose(as_pose(pose, CELL_FRAME)),
+        };
+        if !is_taken {
+            return Err(ENDED.to_owned());
+        }
+    }
+    step(ReplayStep::End, stylus)?;
+    Ok(control.wait_at_end())
+}
+
+fn step(step: ReplayStep, stylus: &OtherParticipants) -> Result<(), String> {
+    stylus
+        .ask(|reply| Arrival::Replay(step, reply))
+        .recv()
+        .map_err(|_| ENDED.to_owned())?
+}

@@ -1,0 +1,37 @@
+//! Result of any calibration on the page.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use touchup_session::calibration::{Calibrated, PayloadFound, ScanFound, TipFound};
+use touchup_session::scene::{Scene, Setting};
+
+/// The result, as `touchup calibrate … --json` prints it.
+#[derive(Clone, Debug, Serialize)]
+#[serde(untagged)]
+pub(super) enum FoundCalibration {
+    Tip(TipFound),
+    Payload(PayloadFound),
+    Scan(ScanFound),
+}
+
+impl fmt::Display for FoundCalibration {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Tip(found) => write!(f, "{found}"),
+            Self::Payload(found) => write!(f, "{found}"),
+            Self::Scan(found) => write!(f, "{found}"),
+        }
+    }
+}
+
+impl Calibrated for FoundCalibration {
+    fn set_in(&self, scene: &mut Scene) -> (Vec<Setting>, String) {
+        match self {
+            Self::Tip(found) => found.set_in(scene),
+            Self::Payload(found) => found.set_in(scene),
+            Self::Scan(found) => found.set_in(scene),
+        }
+    }
+}

@@ -1,0 +1,194 @@
+//! Dry run: touches and paths by the current mesh, checked, without motion of the arm.
+
+use nalgebra::{Isometry3, Point3, Vector3};
+
+use super::cell::Cell;
+use super::ending::Ending;
+use super::prober::{Flag, ProbeParams};
+use super::route::{FreeSpace, ToolState};
+use super::way_out::WayOut;
+use super::world::{World, distance};
+use crate::arm::{ArmState, LimitError, Safety};
+use crate::plan::{ExploreError, PatternParams, Slide, TouchPlan, TouchResult};
+use touchup_method::stylus::Wrench;
+
+/// A planned motion, with its number from 0 on within its kind.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum PlannedMotion {
+    /// number in [`Plan::touches`]
+    #[error("touch {0}")]
+    Touch(usize),
+    /// number in [`Plan::slides`]
+    #[error("slide {0}")]
+    Slide(usize),
+}
+
+/// A planned touch or slide that is impossible.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{what}: {why}")]
+pub struct HeldBack {
+    /// the motion
+    pub what: PlannedMotion,
+    /// reason in words
+    pub why: String,
+}
+
+/// The plan for a flag.
+#[derive(Clone, Debug, Default)]
+pub struct Plan {
+    /// path of the ball's centre, in O, m
+    pub path: Vec<Point3<f64>>,
+    /// moves through free air, from and to, in O, m
+    pub links: Vec<[Point3<f64>; 2]>,
+    /// touches, for a part that equals the mesh
+    pub touches: Vec<TouchPlan>,
+    /// slides after the touches
+    pub slides: Vec<Slide>,
+    /// places of the surface, m in O, without touches, for the scan has no part there
+    pub left_out: Vec<Point3<f64>>,
+    /// impossible touches and slides
+    pub held_back: Vec<HeldBack>,
+}
+
+impl Cell {
+    /// The arm at rest without load, with its tip at a pose in B and the joints of largest
+    /// dexterity; for a plan without an arm. `None` out of reach.
+    pub fn at_rest(&self, pose_bt: &Isometry3<f64>) -> Option<ArmState> {
+        let joints = self
+            .geometry
+            .most_dexterous(&(pose_bt * self.pose_ft.inverse()))?;
+        let nothing = Wrench {
+            force: Vector3::zeros(),
+            torque: Vector3::zeros(),
+        };
+        let (wrench_b, raw_wrench_f) = (nothing, nothing);
+        Some(ArmState {
+            stamp_ns: 0,
+            pose_bt: *pose_bt,
+            wrench_b,
+            raw_wrench_f,
+            joints,
+            safety: Safety::Normal,
+        })
+    }
+}
+
+/// Plans the probing of a flag.
+///
+/// - `now`: state of the arm; `way_out`: of the feature in which it stopped.
+///
+/// # Errors
+/// [`ExploreError`] without a pattern for the flag.
+#[expect(clippy::too_many_lines)]
+pub fn plan(
+    cell: &Cell,
+    params: &ProbeParams,
+    world: &dyn World,
+    flag: &Flag,
+    now: &ArmState,
+    way_out: Option<&WayOut>,
+) -> Result<Plan, ExploreError> {
+    let way_out = way_out.filter(|way_out| way_out.begins_at(now));
+    let in_free_air = way_out.map_or(*now, |way_out| way_out.end(cell, now));
+    let (mut explorer, rotation) = flag.explorer(cell, params, world, &in_free_air)?;
+    let space = FreeSpace {
+        cell,
+        limits: &params.limits,
+        world,
+    };
+    let mut at = ToolState::of(cell, &in_free_air);
+    let mut plan = Plan {
+        path: vec![cell.place(&now.pose_bt)],
+        ..Plan::default()
+    };
+    plan.path
+        .extend(way_out.into_iter().flat_map(WayOut::places));
+    let reach = |allowed: Result<(), LimitError>,
+                 above: &Point3<f64>,
+                 at: &mut ToolState,
+                 plan: &mut Plan| {
+        allowed?;
+        let route = space.route(at, &rotation, above)?;
+        for (place, turned) in route.stops {
+            plan.links.push([at.place, place]);
+            plan.path.push(place);
+            (at.place, at.rotation) = (place, turned);
+        }
+        at.joints = route.joints;
+        Ok::<_, Ending>(())
+    };
+    while let Some(planned) = explorer.next_touch() {
+        let what = PlannedMotion::Touch(plan.touches.len());
+        plan.touches.push(planned);
+        let allowed = space.may_touch(&rotation, &planned, &at.joints);
+        if let Err(ending) = reach(allowed, &planned.entry, &mut at, &mut plan) {
+            plan.held_back.push(HeldBack {
+                what,
+                why: ending.why(),
+            });
+            explorer.take(&TouchResult::Unclear);
+            continue;
+        }
+        let result = contact_on_mesh(&planned, &params.pattern, world);
+        let end = if let TouchResult::At { centre, .. } = result {
+            centre
+        } else {
+            planned.from
+        };
+        // in again and out, slowly
+        plan.path
+            .extend([planned.from, end, planned.from, at.place]);
+        explorer.take(&result);
+    }
+    plan.left_out = explorer.left_out().to_vec();
+    let slides = if params.slides {
+        explorer.slides()
+    } else {
+        Vec::new()
+    };
+    for slide in slides {
+        let what = PlannedMotion::Slide(plan.slides.len());
+        let allowed = space.may_slide(&rotation, &slide, &at.joints);
+        match reach(allowed, &slide.above(0), &mut at, &mut plan) {
+            Ok(()) => {
+                let last = slide.stations.len() - 1;
+                plan.path.extend([slide.above(0), slide.lifted(0)]);
+                plan.path
+                    .extend(slide.stations.iter().map(|station| station.centre));
+                plan.path
+                    .extend([slide.lifted(last), slide.above(last), at.place]);
+            }
+            Err(ending) => plan.held_back.push(HeldBack {
+                what,
+                why: ending.why(),
+            }),
+        }
+        plan.slides.push(slide);
+    }
+    Ok(plan)
+}
+
+/// First contact of a ball with the mesh, by sphere tracing: each step is the remaining distance.
+fn contact_on_mesh(planned: &TouchPlan, pattern: &PatternParams, world: &dyn World) -> TouchResult {
+    let (
+        PatternParams {
+            ball_radius,
+            touch_sigma: sigma,
+            ..
+        },
+        distance,
+    ) = (*pattern, distance(world));
+    let mut gone = 0.0;
+    while gone <= planned.search {
+        let centre = planned.from + planned.direction.into_inner() * gone;
+        let left = distance(&centre, ball_radius + planned.search) - ball_radius;
+        if left < TOUCHES {
+            return TouchResult::At { centre, sigma };
+        }
+        gone += left;
+    }
+    TouchResult::Nothing
+}
+
+/// Distance of a contact, m.
+const TOUCHES: f64 = 5e-6;
