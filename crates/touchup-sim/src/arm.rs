@@ -15,7 +15,7 @@ use super::arm_errors::ArmErrors;
 use super::ball::push_ball;
 use super::error::{SimError, not_negative, positive, up_to};
 use super::random::gauss_vector;
-use super::surface::Surface;
+use crate::surfaces::surface::Surface;
 use touchup_method::stylus::{Payload, Wrench};
 use touchup_probing::arm::{
     Arm, ArmError, ArmGeometry, ArmState, Command, Joints, MOST_JOINTS, Safety, UrGeometry,

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
-use super::surface::{Surface, SurfacePoint};
+use crate::surfaces::surface::{Surface, SurfacePoint};
 
 /// Rounds of linearising the surface around the ball. Each gains a factor of about radius / step;
 /// ten are usual.

@@ -9,12 +9,12 @@ use nalgebra::{Isometry3, Point3, Rotation3, Translation3, Unit, Vector3};
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
 
-use super::contour::{MeshDraft, contour};
 use super::error::{SimError, not_negative, positive, up_to};
-use super::field::Field;
-use super::path::looking_along;
 use super::random::{gauss, gauss_vector, uniform};
-use super::surface::Surface;
+use crate::paths::path::looking_along;
+use crate::surfaces::contour::{MeshDraft, contour};
+use crate::surfaces::field::Field;
+use crate::surfaces::surface::Surface;
 use touchup_geometry::mesh::TriMesh;
 use touchup_geometry::numeric::weighted_quantile;
 

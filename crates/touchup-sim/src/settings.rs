@@ -23,7 +23,7 @@ macro_rules! settings {
         impl $Name {
             /// Refuses the first setting outside its range.
             #[allow(unused_variables, reason = "not every setting has a range")]
-            pub(super) fn check(&self) -> Result<(), super::error::SimError> {
+            pub(super) fn check(&self) -> Result<(), crate::error::SimError> {
                 let Self { $($field,)* } = self;
                 $($($check?;)*)*
                 Ok(())

@@ -13,11 +13,11 @@ use rand_pcg::Pcg64;
 use super::ball::BallContact;
 use super::bending::TipBending;
 use super::error::{SimError, not_negative, positive, up_to};
-use super::path::{Stroke, free};
 use super::random::{Drift, SmoothField};
 use super::sensor::{Moment, Sensor, SensorParams, TICK};
-use super::surface::{Bounds, Surface};
 use super::tip::SimTip;
+use crate::paths::path::{Stroke, free};
+use crate::surfaces::surface::{Bounds, Surface};
 use touchup_geometry::numeric::turned_to;
 use touchup_method::stylus::{Message, TipShape};
 

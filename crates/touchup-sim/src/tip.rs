@@ -11,7 +11,7 @@ use nalgebra::{Point3, UnitQuaternion, Vector3};
 
 use super::ball::{BallContact, TipBall, push_balls};
 use super::error::SimError;
-use super::surface::Surface;
+use crate::surfaces::surface::Surface;
 use touchup_method::stylus::{TipBody, TipShape};
 
 /// Balls around a rim: between two of them a rim of 2 mm is 4 µm too small.

@@ -10,14 +10,14 @@ use rand::SeedableRng;
 use rand_pcg::Pcg64;
 
 use super::error::{SimError, not_negative};
-use super::habit::Habit;
-use super::path::{PathParams, Stroke, plan_mesh, plan_walls};
-use super::plate::Plate;
 use super::random::{gauss, gauss_vector, uniform};
 use super::scanner::{ScannerParams, scan};
 use super::sensor::SensorParams;
 use super::stylus::{StylusParams, Touch, touch};
-use super::surface::Surface;
+use crate::paths::habit::Habit;
+use crate::paths::path::{PathParams, Stroke, plan_mesh, plan_walls};
+use crate::surfaces::plate::Plate;
+use crate::surfaces::surface::Surface;
 use touchup_geometry::mesh::TriMesh;
 
 /// A world by its name.

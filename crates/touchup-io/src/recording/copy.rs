@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::writer::not_written;
+use super::mcap_files::writer::not_written;
 use super::{Record, RecordingError, RecordingReader, RecordingWriter, Topics};
 use crate::atomic::AtomicFile;
 use touchup_method::stylus::Message;

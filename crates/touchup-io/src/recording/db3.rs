@@ -14,9 +14,9 @@ use rusqlite::limits::Limit;
 use rusqlite::{Connection, OpenFlags, params};
 use tempfile::NamedTempFile;
 
-use super::framing::NameBytes;
+use super::mcap_files::framing::NameBytes;
+use super::messages::wire::MAX_MESSAGE_BYTES;
 use super::topics::check_topic;
-use super::wire::MAX_MESSAGE_BYTES;
 use super::{
     Damage, FilePlace, MessageFormat, RawMessage, RecordingError, RecordingFile, RecordingLayout,
     TopicInfo, TopicKind,

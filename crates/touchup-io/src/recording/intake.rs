@@ -3,12 +3,12 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::path::Path;
 
-use super::cdr::unpack;
-use super::decode::{Decoded, decode};
 use super::error::BadCount;
-use super::number_table::TableRow;
-use super::transforms::TransformChain;
-use super::wire::Wire;
+use super::messages::cdr::unpack;
+use super::messages::decode::{Decoded, decode};
+use super::messages::transforms::TransformChain;
+use super::messages::wire::Wire;
+use super::tables::number_table::TableRow;
 use super::{BadMessage, FilePlace, RawMessage, Record, StampSource, TopicKind};
 use touchup_method::stylus::Message;
 

@@ -1,6 +1,6 @@
 //! Places of the poses and wrenches of a touch in a recording.
 
-use super::columns::TableColumns;
+use super::tables::columns::TableColumns;
 
 /// Names of the topics that make a touch.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -9,46 +9,32 @@
 //! Python readers open; [`write_recording`] publishes only whole ones, [`SegmentedWriter`] writes a
 //! growing one, in pieces that a crash leaves whole.
 
-mod bag;
-mod bag_index;
-mod cdr;
-mod columns;
+mod bags;
 mod copy;
 mod db3;
-mod decode;
 mod error;
 mod folder;
-mod framing;
-mod franka;
 mod intake;
 mod layout;
-mod live_message;
-mod mcap;
-mod message_type;
-mod number_table;
+mod mcap_files;
+mod messages;
 mod opening;
-mod point_cloud;
 mod reader;
-mod resume;
-mod segments;
+mod tables;
 mod topics;
-mod transforms;
-mod units;
-mod wire;
-mod writer;
 
 pub use crate::file_error::FilePlace;
-pub use columns::{TableColumns, WrenchAxes};
 pub use copy::{CopiedRecording, copy_recording};
 pub use error::{BadCount, BadMessage, Damage, RecordingError};
 pub(crate) use folder::{is_of_recording, own_files};
 pub use layout::{RecordingLayout, Topics, TransformFrames};
 use layout::{TopicInfo, TopicKind};
-pub use live_message::{LiveMessage, LiveSeed, LiveType, SampleKind};
-use message_type::MessageFormat;
+pub use mcap_files::segments::SegmentedWriter;
+pub use mcap_files::writer::{RecordingWriter, write_recording};
+pub use messages::live_message::{LiveMessage, LiveSeed, LiveType, SampleKind};
+use messages::message_type::MessageFormat;
 pub use reader::RecordingReader;
-pub use segments::SegmentedWriter;
-pub use writer::{RecordingWriter, write_recording};
+pub use tables::columns::{TableColumns, WrenchAxes};
 
 /// Start of a zstd frame: a file compressed as a whole, or a message (CDR begins with 0).
 const ZSTD_MAGIC: [u8; 4] = [0x28, 0xb5, 0x2f, 0xfd];

@@ -4,10 +4,10 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
-use super::bag::BagReader;
-use super::bag_index;
+use super::bags::bag::BagReader;
+use super::bags::bag_index;
 use super::db3::{self, Db3Reader};
-use super::mcap::{self, McapReader};
+use super::mcap_files::mcap::{self, McapReader};
 use super::{RecordingError, RecordingFile, RecordingLayout, ZSTD_MAGIC};
 
 const ROS1_MAGIC: &[u8] = b"#ROSBAG V";

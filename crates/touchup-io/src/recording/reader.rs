@@ -4,12 +4,12 @@ use std::collections::{BTreeMap, VecDeque};
 use std::iter::FusedIterator;
 use std::path::{Path, PathBuf};
 
-use super::columns::WrenchAxes;
 use super::error::BadCount;
 use super::folder::files_of;
 use super::intake::Intake;
-use super::number_table::{NumberTable, is_table};
 use super::opening::open_file;
+use super::tables::columns::WrenchAxes;
+use super::tables::number_table::{NumberTable, is_table};
 use super::{BadMessage, Record, RecordingError, RecordingFile, RecordingLayout, StampSource};
 use touchup_geometry::numeric::counted;
 use touchup_method::stylus::Message;

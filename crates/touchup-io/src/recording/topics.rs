@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::RecordingError;
 use super::layout::{RecordingLayout, TopicInfo, TopicKind};
-use super::message_type::MessageFormat;
+use super::messages::message_type::MessageFormat;
 
 /// Checks that the required topics exist, and that the topics in use have suitable types.
 pub(super) fn check_topics(

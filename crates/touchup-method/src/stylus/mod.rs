@@ -10,12 +10,10 @@
 //! transforms of a [`FrameBuffer`].
 
 mod bias;
-mod clock;
-mod clock_offset;
+mod clocks;
 mod compensate;
 mod contact;
 mod contact_estimator;
-mod course_clock;
 mod force_noise;
 mod frame_buffer;
 mod free_motion;
@@ -32,8 +30,8 @@ mod tip_motion;
 mod tip_shape;
 
 pub use bias::{BiasParams, BiasTracker};
-pub use clock::ClockEstimator;
-pub use clock_offset::{ClockDrift, ClockEvidence, ClockOffset};
+pub use clocks::clock::ClockEstimator;
+pub use clocks::clock_offset::{ClockDrift, ClockEvidence, ClockOffset};
 pub use compensate::{
     Compensator, CompensatorParams, Payload, SensorBias, SensorMount, Tip, WrenchFrame,
 };

@@ -3,8 +3,8 @@
 use nalgebra::{Point3, Vector3};
 
 use super::design::{Asked, Candidate, Knowledge};
+use super::kinds::slot::around_stadium;
 use super::search_context::toward;
-use super::slot::around_stadium;
 use touchup_features::features::fit::{Freedom, Surface};
 use touchup_features::features::{Feature, Kind, Walls};
 use touchup_method::stylus::ProbedPoint;

@@ -6,25 +6,18 @@
 
 mod advice;
 mod arm_uncertainty;
-mod boss;
-mod cylinder_fit;
 mod decision;
 mod design;
-mod edge;
 mod error;
 mod explorer;
-mod hole;
+mod kinds;
 mod level;
 mod measuring;
 mod outline;
 mod pattern;
-mod plane;
-mod region;
 mod search;
 mod search_context;
 mod slide;
-mod slot;
-mod slot_fit;
 mod tolerance;
 
 pub use advice::{NextTouch, advise_next_touch};

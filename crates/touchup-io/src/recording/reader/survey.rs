@@ -1,10 +1,10 @@
 //! Survey of a recording before reading.
 
-use super::super::decode::Decoded;
 use super::super::intake::decode_raw;
+use super::super::messages::decode::Decoded;
+use super::super::messages::transforms::TransformTree;
 use super::super::opening::open_file;
 use super::super::topics::check_topics;
-use super::super::transforms::TransformTree;
 use super::super::{RecordingError, RecordingFile, TopicInfo, TopicKind, TransformFrames};
 use super::RecordingReader;
 

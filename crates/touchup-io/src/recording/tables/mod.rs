@@ -1,0 +1,5 @@
+//! Recordings as tables of numbers.
+
+pub mod columns;
+pub mod number_table;
+pub mod units;
