@@ -8,7 +8,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 use touchup::align::{IcpParams, icp};
 use touchup::compare::deviations;
-use touchup::mesh::{Alone, FaceTree, TriMesh, Workers};
+use touchup::mesh::{FaceTree, SerialWorkers, TriMesh, Workers};
 use touchup::sim::wavy;
 use touchup::threads::Threads;
 
@@ -52,7 +52,7 @@ fn point_to_surface(bencher: Bencher, faces: usize) {
 /// The same by one thread.
 #[divan::bench(args = [100_000, 1_000_000, 2_000_000], sample_count = 5)]
 fn point_to_surface_alone(bencher: Bencher, faces: usize) {
-    distances(bencher, faces, &Alone);
+    distances(bencher, faces, &SerialWorkers);
 }
 
 fn distances(bencher: Bencher, faces: usize, workers: &dyn Workers) {
@@ -74,7 +74,7 @@ fn points_to_mesh(bencher: Bencher, faces: usize) {
 /// The same by one thread.
 #[divan::bench(args = [200_000, 2_000_000], sample_count = 10)]
 fn points_to_mesh_alone(bencher: Bencher, faces: usize) {
-    register(bencher, faces, &Alone);
+    register(bencher, faces, &SerialWorkers);
 }
 
 fn register(bencher: Bencher, faces: usize, workers: &dyn Workers) {

@@ -6,7 +6,9 @@
 use divan::{Bencher, black_box};
 use nalgebra::{Point3, Vector3};
 use rand::{RngExt, SeedableRng};
-use touchup::haptic::{Along, ContactModel, DynamicsParams, FaceDynamics, FaceState, StepRule};
+use touchup::haptic::{
+    ContactModel, DynamicsParams, FaceDynamics, FaceState, MotionDirection, StepRule,
+};
 
 fn main() {
     divan::main();
@@ -26,7 +28,7 @@ fn sigmoid(h_min_m: f64) -> ContactModel {
     }
 }
 
-fn dynamics(rule: &str, model: ContactModel, along: Along) -> FaceDynamics {
+fn dynamics(rule: &str, model: ContactModel, along: MotionDirection) -> FaceDynamics {
     let rule = match rule {
         "lie" => StepRule::Lie,
         "corrected" => StepRule::DriftCorrected,
@@ -92,7 +94,7 @@ fn run(bencher: Bencher, dynamics: FaceDynamics, h_max_m: f64, dt: f64) {
 fn usual(bencher: Bencher, rule: &str) {
     run(
         bencher,
-        dynamics(rule, sigmoid(0.5e-3), Along::Force),
+        dynamics(rule, sigmoid(0.5e-3), MotionDirection::Force),
         2e-3,
         1e-3,
     );
@@ -102,7 +104,7 @@ fn usual(bencher: Bencher, rule: &str) {
 fn usual_along_normal(bencher: Bencher, rule: &str) {
     run(
         bencher,
-        dynamics(rule, sigmoid(0.5e-3), Along::InitialNormal),
+        dynamics(rule, sigmoid(0.5e-3), MotionDirection::InitialNormal),
         2e-3,
         1e-3,
     );
@@ -112,7 +114,7 @@ fn usual_along_normal(bencher: Bencher, rule: &str) {
 fn stiff(bencher: Bencher, rule: &str) {
     run(
         bencher,
-        dynamics(rule, sigmoid(1e-6), Along::Force),
+        dynamics(rule, sigmoid(1e-6), MotionDirection::Force),
         1e-4,
         5e-3,
     );
@@ -120,5 +122,10 @@ fn stiff(bencher: Bencher, rule: &str) {
 
 #[divan::bench(args = RULES, sample_size = 100)]
 fn spring(bencher: Bencher, rule: &str) {
-    run(bencher, dynamics(rule, SPRING, Along::Force), 2e-3, 1e-3);
+    run(
+        bencher,
+        dynamics(rule, SPRING, MotionDirection::Force),
+        2e-3,
+        1e-3,
+    );
 }

@@ -32,7 +32,7 @@ use serde::de::DeserializeOwned;
 use touchup::clock::Clock;
 use touchup::io::mesh_file::{MeshUnit, write_mesh};
 use touchup::live::Quantiles;
-use touchup::node::{INBOX, Node, Prepared, SessionReport};
+use touchup::node::{INBOX, Node, PreparedNode, SessionReport};
 use touchup::ros::arguments::NodeConfig;
 use touchup::ros::in_process::OtherParticipants;
 use touchup::ros::inbox::inbox;
@@ -159,7 +159,7 @@ fn alone(faces: usize) {
     let folder = tempfile::tempdir().expect("there is room in the folder for temporary files");
     let (inbox, received) = inbox(INBOX, &Clock::system());
     let (port, world) = in_process::start(inbox, &Clock::system());
-    let ready = Prepared::new(parameters(folder.path(), faces)).expect("the scan is sound");
+    let ready = PreparedNode::new(parameters(folder.path(), faces)).expect("the scan is sound");
     let node = ready
         .start(port, received, None)
         .expect("there are threads");
@@ -201,7 +201,8 @@ fn beside_pages(faces: usize, turns: usize) {
                 tempfile::tempdir().expect("there is room in the folder for temporary files");
             let (inbox, received) = inbox(INBOX, &Clock::system());
             let (port, world) = in_process::start(inbox.clone(), &Clock::system());
-            let ready = Prepared::new(parameters(folder.path(), faces)).expect("the scan is sound");
+            let ready =
+                PreparedNode::new(parameters(folder.path(), faces)).expect("the scan is sound");
             let address = ([127, 0, 0, 1], 0).into();
             let params = WebParams {
                 address,
@@ -367,7 +368,7 @@ fn over_dds(faces: usize, seconds: usize, plots: Option<&Path>) {
     echo(domain, folder.path());
     let parameters = parameters(folder.path(), faces);
     let (inbox, received) = inbox(INBOX, &Clock::system());
-    let ready = Prepared::new(parameters.clone()).expect("the scan is sound");
+    let ready = PreparedNode::new(parameters.clone()).expect("the scan is sound");
     let port = dds::start(&config(domain, parameters), inbox.clone())
         .expect("the loopback interface is up");
     let node = ready

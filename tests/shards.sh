@@ -140,7 +140,7 @@ shard_10() {
 shard_11() {
   title "Comparison, alignment, sessions and files"
   # what is in no other shard
-  slow_rust 'binary(rooms) & !test(/^(features|form|haptic|mesh|probing|reconstruct|scene|sim|stylus)::/)'
+  slow_rust 'binary(ros) | (binary(rooms) & !test(/^(features|form|haptic|mesh|probing|reconstruct|scene|sim|stylus)::/))'
 }
 
 # the client in the interpreter beside it, against a controller that fails; unit tests, and rooms of many property tests

@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 
 use super::CliError;
 use super::arm_errors::ArmErrorsName;
-use super::probing::{KeptMeasurements, Ready, SpotWorld, millimetres};
+use super::probing::{KeptMeasurements, ProbingSetup, SpotWorld, millimetres};
 use super::progress::WorkProgress;
 use super::signals::StopSignals;
 use touchup_features::calibrate::ReferenceSphere;
@@ -20,7 +20,7 @@ use touchup_node::ros2_control::{ArmTopics, Ros2ControlArm, Ros2ControlParams};
 #[cfg(feature = "ur")]
 use touchup_node::ur::{UrArm, UrParams};
 use touchup_probing::arm::Arm;
-use touchup_probing::execute::{Cell, Prober};
+use touchup_probing::execute::{Prober, RobotCell};
 use touchup_session::scan::read_scan;
 #[cfg(feature = "ur")]
 use touchup_session::scene::RobotSection;
@@ -296,7 +296,7 @@ impl CellArguments {
     pub fn with<T>(
         &self,
         robot: RobotName,
-        ready: &Ready,
+        ready: &ProbingSetup,
         truth: impl FnOnce(ArmParams) -> Result<ArmParams, CliError>,
         work: impl FnOnce(&mut dyn Arm) -> Result<T, CliError>,
     ) -> Result<T, CliError> {
@@ -334,9 +334,9 @@ impl CellArguments {
         }: Measurement<'_>,
         truth: impl FnOnce(ArmParams, &Scene) -> Result<ArmParams, CliError>,
         work: impl FnOnce(&mut Prober<'_>) -> Result<T, E>,
-    ) -> Result<(T, Cell), CliError> {
+    ) -> Result<(T, RobotCell), CliError> {
         let (scan, unit) = self.scan(scene)?;
-        let ready = Ready::read(scene, &scan, unit)?.beside(spheres);
+        let ready = ProbingSetup::read(scene, &scan, unit)?.beside(spheres);
         ready.may_move()?;
         let _measuring = WorkProgress::stage(stage);
         let truth = |arm| truth(arm, &ready.scene);

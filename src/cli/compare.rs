@@ -9,7 +9,9 @@ use clap::{Args, ValueEnum};
 use nalgebra::{Isometry3, Point3};
 use tracing::warn;
 
-use self::alignment::{Alignment, aligned_by_features, aligned_by_icp, aligned_by_pairs, moved};
+use self::alignment::{
+    AlignmentReport, aligned_by_features, aligned_by_icp, aligned_by_pairs, moved,
+};
 use self::table::CompareReport;
 pub use self::table::comparison_json;
 use super::pictures::{file_name, today, view_from, write_coloured, write_picture};
@@ -196,7 +198,7 @@ pub(super) fn compared(arguments: &CompareArguments) -> Result<CompareReport, Cl
             today(),
             alignment
                 .as_ref()
-                .map_or("not aligned".to_owned(), Alignment::in_short)
+                .map_or("not aligned".to_owned(), AlignmentReport::in_short)
         );
         let before = before.as_ref().zip(scanned.as_ref());
         arguments.draw(

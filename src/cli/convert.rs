@@ -42,7 +42,7 @@ pub(super) struct ConvertArguments {
 
 /// Output of `--json`.
 #[derive(Debug, Serialize)]
-struct Converted {
+struct ConversionReport {
     /// Poses, or frames of markers.
     poses: u64,
     wrenches: u64,
@@ -61,7 +61,7 @@ struct TransformCounts {
     outside: u64,
 }
 
-impl fmt::Display for Converted {
+impl fmt::Display for ConversionReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let frame = |name: &str| {
             if name.is_empty() {
@@ -135,7 +135,7 @@ pub(super) fn convert(arguments: &ConvertArguments) -> Result<Losses, CliError> 
             interpolated,
             outside,
         });
-    let converted = Converted {
+    let converted = ConversionReport {
         poses,
         wrenches,
         pose_frame,

@@ -17,8 +17,8 @@ use super::node::end_text;
 #[cfg(any(feature = "ros", feature = "r2r"))]
 use super::page::{on_page, parameters_of};
 use super::progress::WorkProgress;
-use super::refinement::{RefineSummary, Refined, RefinementFiles};
-use super::simulate::{Simulated, write_simulation};
+use super::refinement::{RefineSummary, RefinementFiles, RefinementResult};
+use super::simulate::{SimulatedInput, write_simulation};
 use super::told::ToldFlags;
 #[cfg(any(feature = "ros", feature = "r2r"))]
 use super::web::WebFlags;
@@ -124,7 +124,7 @@ pub(super) fn demo(arguments: &DemoArguments) -> Result<Losses, CliError> {
     };
     let truth = plate.mesh(CHORD_ERROR)?;
     let stylus = StylusParams::default();
-    let Simulated { scan, touch } = write_simulation(
+    let SimulatedInput { scan, touch } = write_simulation(
         &plate,
         &truth,
         &path,
@@ -143,7 +143,7 @@ pub(super) fn demo(arguments: &DemoArguments) -> Result<Losses, CliError> {
     let (scan_file, unit) = (out.join("scan.ply"), MeshUnit::Millimetre);
     let recorded = RecordedAs::default();
     let files = RefinementFiles::in_folder(&scan_file, unit, out, "touch.mcap", recorded);
-    let Refined {
+    let RefinementResult {
         summary, losses, ..
     } = files.refine(scene, told, RefinementOptions::default())?;
     // measures the mesh as written

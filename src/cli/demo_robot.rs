@@ -14,7 +14,7 @@ use serde::Serialize;
 use super::arm_errors::ArmErrorsName;
 use super::check::{CheckReport, Gates, SPOT_TOUCHES, touched};
 use super::compare::{CompareArguments, compared};
-use super::probing::{Done, Probing, ProbingSummary, Ready};
+use super::probing::{Probing, ProbingOutcome, ProbingSetup, ProbingSummary};
 use super::progress::WorkProgress;
 use super::signals::StopSignals;
 use super::{CliError, Losses, not_written, print_result, reported, write_json};
@@ -24,7 +24,7 @@ use touchup_io::atomic::{create_folder, write_atomically};
 use touchup_io::features_file::FeatureRecord;
 use touchup_io::mesh_file::{MeshUnit, write_mesh};
 use touchup_probing::arm::Arm;
-use touchup_probing::execute::{Flag, Probed, Prober};
+use touchup_probing::execute::{Flag, FlagResult, Prober};
 use touchup_sim::{Plate, ScannerParams, SimArm, TruthFeature, TruthShape, WithSpheres, scan};
 
 /// Scene of the demo, written beside the other files.
@@ -75,7 +75,7 @@ struct RobotSummary {
 
 reported! {
     /// Errors of a probed feature; `found`: its measurement, if any.
-    struct ProbedError, fn of(flag: &Flag, truth: &TruthFeature, probed: Option<&Probed>, found: Option<&Feature>) {
+    struct ProbedError, fn of(flag: &Flag, truth: &TruthFeature, probed: Option<&FlagResult>, found: Option<&Feature>) {
         name: &'static str = truth.name,
         /// Error of the click.
         click_mm: f64 = (flag.place - truth.centre).xy().norm() * 1e3,
@@ -176,7 +176,7 @@ pub(super) fn demo_robot(out: &Path, seed: u64) -> Result<Losses, CliError> {
     let now = arm.next_state().map_err(CliError::arm)?;
     probing.planned(&ready, &now)?;
     // nothing real moves: a signal ends this as any other verb
-    let Done {
+    let ProbingOutcome {
         summary,
         probed,
         outcome,
@@ -209,7 +209,7 @@ pub(super) fn demo_robot(out: &Path, seed: u64) -> Result<Losses, CliError> {
 }
 
 /// Touches the spot and all spheres.
-fn checked(ready: &Ready, arm: &mut dyn Arm) -> Result<CheckReport, CliError> {
+fn checked(ready: &ProbingSetup, arm: &mut dyn Arm) -> Result<CheckReport, CliError> {
     let _checking = WorkProgress::stage("check");
     let mut world = ready.static_world()?;
     let mut prober = Prober::new(arm, &ready.cell, &ready.params, &mut world);
@@ -223,7 +223,7 @@ fn checked(ready: &Ready, arm: &mut dyn Arm) -> Result<CheckReport, CliError> {
     )
 }
 
-fn feature_of(probed: &Probed) -> Option<&Feature> {
+fn feature_of(probed: &FlagResult) -> Option<&Feature> {
     probed.found.as_ref()?.feature.as_ref()
 }
 

@@ -12,7 +12,7 @@ use touchup_features::features::clusters::{
     Cluster, ClusterParams, PaperParams, clusters, paper_clusters,
 };
 use touchup_features::features::curvature::curvature;
-use touchup_features::features::{Detection, Feature, FittedTo, Form, Kind, Measured};
+use touchup_features::features::{Detection, Feature, FeatureKind, FittedTo, Form, MeasuredValue};
 use touchup_geometry::mesh::TriMesh;
 use touchup_io::features_file::FeatureFile;
 use touchup_io::mesh_file::MeshUnit;
@@ -168,7 +168,7 @@ fn feature_table(
     if features.is_empty() {
         lines.push("no features".to_owned());
     } else {
-        let counts: Vec<_> = Kind::ALL
+        let counts: Vec<_> = FeatureKind::ALL
             .into_iter()
             .filter_map(|kind| count(features, kind))
             .collect();
@@ -180,7 +180,7 @@ fn feature_table(
         lines.extend(
             features
                 .iter()
-                .filter(|feature| feature.kind != Kind::Plane)
+                .filter(|feature| feature.kind != FeatureKind::Plane)
                 .map(row),
         );
     }
@@ -196,12 +196,12 @@ fn feature_table(
 /// Smallest listed share of the surface.
 const NOTABLE: f64 = 0.05;
 
-fn count(features: &[Feature], kind: Kind) -> Option<String> {
+fn count(features: &[Feature], kind: FeatureKind) -> Option<String> {
     let count = features
         .iter()
         .filter(|feature| feature.kind == kind)
         .count();
-    let ending = if matches!(kind, Kind::Boss | Kind::Notch) {
+    let ending = if matches!(kind, FeatureKind::Boss | FeatureKind::Notch) {
         "es"
     } else {
         "s"
@@ -226,7 +226,7 @@ fn row(feature: &Feature) -> String {
 
 fn size(feature: &Feature) -> String {
     let mut parts = Vec::new();
-    let mut part = |before: &str, measured: &Option<Measured<f64>>| {
+    let mut part = |before: &str, measured: &Option<MeasuredValue<f64>>| {
         if let Some(measured) = measured {
             parts.push(format!("{before}{}", with_std(measured)));
         }
@@ -256,7 +256,7 @@ fn size(feature: &Feature) -> String {
 /// Smallest listed roundness of a CAD mesh, m: smaller values are its rounding.
 const NOTABLE_FORM: f64 = 1e-6;
 
-fn with_std(measured: &Measured<f64>) -> String {
+fn with_std(measured: &MeasuredValue<f64>) -> String {
     let std = measured
         .std
         .map_or_else(String::new, |std| format!(" ± {:.3}", std * 1e3));

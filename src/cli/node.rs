@@ -16,7 +16,7 @@ use super::{
 };
 use touchup_geometry::mesh::TriMesh;
 use touchup_node::node::{
-    ArmKind, ArmOfNode, INBOX, NodeEnd, NodeError, Prepared, SessionReport, mesh_unit,
+    ArmKind, ArmOfNode, INBOX, NodeEnd, NodeError, PreparedNode, SessionReport, mesh_unit,
 };
 use touchup_node::ros;
 use touchup_node::ros::arguments::NodeConfig;
@@ -70,7 +70,7 @@ pub(super) fn node(arguments: &NodeArguments, ros: &[String]) -> Result<Losses, 
         arguments
             .web
             .begun(arguments.web_scans.as_deref(), &mut config, &mut begin)?;
-    let Begun {
+    let ConnectedNode {
         ready,
         nominal,
         inbox,
@@ -96,8 +96,8 @@ pub(super) fn node(arguments: &NodeArguments, ros: &[String]) -> Result<Losses, 
 }
 
 /// Node with its network and its arm.
-struct Begun {
-    ready: Prepared,
+struct ConnectedNode {
+    ready: PreparedNode,
     nominal: Option<TriMesh>,
     inbox: Inbox,
     arrivals: Arrivals,
@@ -139,8 +139,12 @@ fn arm_of(config: &NodeConfig, scene: &Scene) -> Result<Option<ArmOfNode>, CliEr
 impl NodeArguments {
     /// Fallible steps before the node exists, so that an operator can mend a failure and begin
     /// anew.
-    fn begin(&self, config: &NodeConfig, signals: &SignalledNode) -> Result<Begun, BeginError> {
-        let ready = Prepared::new(config.parameters.clone())?;
+    fn begin(
+        &self,
+        config: &NodeConfig,
+        signals: &SignalledNode,
+    ) -> Result<ConnectedNode, BeginError> {
+        let ready = PreparedNode::new(config.parameters.clone())?;
         let (inbox, arrivals) = inbox(INBOX, &Clock::system());
         signals.set(Some(inbox.clone()));
         let begun = self.around(config, ready, inbox, arrivals);
@@ -152,10 +156,10 @@ impl NodeArguments {
     fn around(
         &self,
         config: &NodeConfig,
-        ready: Prepared,
+        ready: PreparedNode,
         inbox: Inbox,
         arrivals: Arrivals,
-    ) -> Result<Begun, CliError> {
+    ) -> Result<ConnectedNode, CliError> {
         let (scan, faces) = ready.scan();
         print_result(&format!(
             "scan: {} with {faces} faces; session: {}",
@@ -171,7 +175,7 @@ impl NodeArguments {
         let nominal = self.web.nominal(ready.mesh_unit())?;
         let port = ros::start(config, inbox.clone())?;
         let arm = arm_of(config, ready.scene())?;
-        Ok(Begun {
+        Ok(ConnectedNode {
             ready,
             nominal,
             inbox,
@@ -182,7 +186,7 @@ impl NodeArguments {
     }
 
     /// Settings that determine the mesh, and their sources.
-    fn told(&self, config: &NodeConfig, ready: &Prepared) -> ToldNumbers {
+    fn told(&self, config: &NodeConfig, ready: &PreparedNode) -> ToldNumbers {
         let is_set = config.parameters.double("tip_radius_mm") > 0.0;
         let by_flag = self.tip_radius_mm.filter(|_| is_set);
         let radius_by = by_flag

@@ -11,7 +11,7 @@ use super::web::WebFlags;
 use super::{CliError, notify};
 use touchup_io::mesh_file::MeshUnit;
 use touchup_method::stylus::MarkerFilter;
-use touchup_node::node::{INBOX, NodeEnd, NodeError, Prepared};
+use touchup_node::node::{INBOX, NodeEnd, NodeError, PreparedNode};
 use touchup_node::ros::in_process;
 use touchup_node::ros::inbox::inbox;
 use touchup_node::ros::parameters::{ParameterValue, Parameters};
@@ -29,7 +29,7 @@ pub(super) fn on_page(
     recording: Recording,
     markers: Option<MarkerFilter>,
 ) -> Result<NodeEnd, CliError> {
-    let ready = Prepared::new(parameters)?;
+    let ready = PreparedNode::new(parameters)?;
     let clock = Clock::system();
     let (inbox, arrivals) = inbox(INBOX, &clock);
     SignalledNode::listen()

@@ -8,12 +8,12 @@ use nalgebra::Point3;
 use serde::Serialize;
 
 use super::arm::{ArmArguments, RobotName};
-use super::probing::{Done, Probing, Ready, flag_of, goals_of, millimetres};
+use super::probing::{Probing, ProbingOutcome, ProbingSetup, flag_of, goals_of, millimetres};
 use super::signals::StopSignals;
 use super::told::ToldNumbers;
 use super::{CliError, Losses, counted, print_report, reported, require, require_positive};
 use touchup_features::conformity::DecisionParams;
-use touchup_probing::arm::{Arm, Narrower};
+use touchup_probing::arm::{Arm, RequestLimits};
 use touchup_probing::execute::{Flag, HeldBack, Plan, PlannedMotion};
 
 #[derive(Debug, Args)]
@@ -132,14 +132,14 @@ impl ProbeArguments {
     }
 
     /// Narrows the scene's limits to the request.
-    fn narrow(&self, ready: &mut Ready, flags: &[Flag]) -> Result<(), CliError> {
+    fn narrow(&self, ready: &mut ProbingSetup, flags: &[Flag]) -> Result<(), CliError> {
         if let Some(temperature_c) = self.temperature_c {
             ready.at_temperature(temperature_c)?;
         }
-        let by = Narrower {
+        let by = RequestLimits {
             force: self.max_force_n,
             time: self.max_duration_s,
-            ..Narrower::default()
+            ..RequestLimits::default()
         };
         let wanted_mm = ready.tolerance_mm();
         ready.params = ready.params.narrowed(&by).map_err(CliError::usage)?;
@@ -174,7 +174,7 @@ impl ProbeArguments {
     }
 
     /// Plans without an arm, from `--from-mm` on.
-    fn plan_alone(&self, probing: &Probing<'_>, ready: &Ready) -> Result<Losses, CliError> {
+    fn plan_alone(&self, probing: &Probing<'_>, ready: &ProbingSetup) -> Result<Losses, CliError> {
         let from = self
             .from_mm
             .as_ref()
@@ -211,13 +211,13 @@ impl ProbeArguments {
     fn run(
         &self,
         probing: &Probing<'_>,
-        ready: &Ready,
+        ready: &ProbingSetup,
         arm: &mut dyn Arm,
         signals: &StopSignals,
     ) -> Result<Losses, CliError> {
         let now = arm.next_state().map_err(CliError::arm)?;
         probing.planned(ready, &now)?;
-        let Done {
+        let ProbingOutcome {
             summary, outcome, ..
         } = probing.done(ready, arm, self.resume, signals)?;
         print_report(self.json, &summary, || {

@@ -22,14 +22,14 @@ pub(super) struct RecoverArguments {
 
 pub(super) fn recover(arguments: &RecoverArguments) -> Result<Losses, CliError> {
     let mut arm = recovered_ur(&Scene::read(&arguments.scene)?)?;
-    let recovered = Recovered::of(&arm.next_state().map_err(CliError::arm)?);
+    let recovered = RecoveryReport::of(&arm.next_state().map_err(CliError::arm)?);
     print_report(arguments.json, &recovered, || recovered.to_string())?;
     Ok(Losses::new())
 }
 
 reported! {
     /// Output of `--json`.
-    struct Recovered, fn of(state: &ArmState) {
+    struct RecoveryReport, fn of(state: &ArmState) {
         /// Position of the tip in the base of the arm.
         tip_mm: [f64; 3] = (state.pose_bt.translation.vector * 1e3).into(),
         /// Force on the sensor, before taring.
@@ -37,7 +37,7 @@ reported! {
     }
 }
 
-impl fmt::Display for Recovered {
+impl fmt::Display for RecoveryReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self {
             tip_mm: [x, y, z],

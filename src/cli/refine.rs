@@ -10,7 +10,7 @@ use super::page::{on_page, parameters_of};
 #[cfg(any(feature = "ros", feature = "r2r"))]
 use super::path_parameter::path;
 use super::recorded::RecordedFlags;
-use super::refinement::{Refined, RefinementFiles};
+use super::refinement::{RefinementFiles, RefinementResult};
 use super::told::{ToldFlags, ToldNumbers};
 #[cfg(any(feature = "ros", feature = "r2r"))]
 use super::web::WebFlags;
@@ -105,7 +105,7 @@ pub(super) fn refine(arguments: &RefineArguments) -> Result<Losses, CliError> {
     let arguments = arguments.clone().completed()?;
     #[cfg(any(feature = "ros", feature = "r2r"))]
     let arguments = arguments.after_the_page()?;
-    let Refined {
+    let RefinementResult {
         repair,
         summary,
         losses,
@@ -229,7 +229,7 @@ impl RefineArguments {
     }
 
     /// Reads, replays and writes.
-    fn refined(&self) -> Result<Refined, CliError> {
+    fn refined(&self) -> Result<RefinementResult, CliError> {
         let (scene, told) = self.scene()?;
         self.check_out()?;
         // a scene without an update has an error of its own

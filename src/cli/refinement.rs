@@ -51,7 +51,7 @@ pub(super) struct RefineSummary {
 }
 
 /// Result of refining a scan.
-pub(super) struct Refined {
+pub(super) struct RefinementResult {
     /// Repairs of the scan's file.
     pub repair: RepairReport,
     pub summary: RefineSummary,
@@ -88,7 +88,7 @@ impl RefinementFiles {
         scene: Scene,
         told: ToldNumbers,
         options: RefinementOptions,
-    ) -> Result<Refined, CliError> {
+    ) -> Result<RefinementResult, CliError> {
         let started = Instant::now();
         let OpenedInput {
             input,
@@ -141,7 +141,7 @@ impl RefinementFiles {
             load_s,
             replay_s,
         };
-        Ok(Refined {
+        Ok(RefinementResult {
             repair,
             summary,
             losses,

@@ -21,7 +21,7 @@ use touchup_node::ros::parameters::ParameterValue;
 use touchup_node::ros::playback::{PlayedTime, wrench_frame_id};
 use touchup_node::ros::port::SamplePort;
 use touchup_node::ros::{as_pose, as_wrench};
-use touchup_session::replay::{Recording, Replayed, each_message, marker_filter};
+use touchup_session::replay::{Recording, ReplaySummary, each_message, marker_filter};
 use touchup_session::scene::Scene;
 
 /// Wait after discovery of the subscribers, which do not announce their own discovery of this node.
@@ -65,7 +65,7 @@ fn speed(text: &str) -> Result<f64, String> {
 
 /// Output of `--json`.
 #[derive(Debug, Default, Serialize)]
-pub(super) struct Played {
+pub(super) struct PlaybackReport {
     wrenches: u64,
     poses: u64,
     /// Messages refused by the network.
@@ -131,9 +131,13 @@ pub(super) fn play(
     speed: f64,
     source: &str,
     port: &dyn SamplePort,
-) -> Result<(Played, Replayed), CliError> {
+) -> Result<(PlaybackReport, ReplaySummary), CliError> {
     let wrench_frame = wrench_frame_id(recording.wrench_frame, source);
-    let (mut played, mut pace, began) = (Played::default(), ReplayPace::new(speed), Instant::now());
+    let (mut played, mut pace, began) = (
+        PlaybackReport::default(),
+        ReplayPace::new(speed),
+        Instant::now(),
+    );
     let mut publish = |message: Message| {
         pace.wait_for(message.stamp_ns());
         let is_sent = match &message {

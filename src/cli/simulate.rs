@@ -19,8 +19,8 @@ use touchup_io::recording::{Record, Topics, write_recording};
 use touchup_method::stylus::{MarkerFrame, Message};
 use touchup_session::scan::{Scan, read_scan};
 use touchup_sim::{
-    CameraParams, DrawnWorld, Habit, MeshSurface, Moment, PathParams, ScannerParams, SimError,
-    SimWorld, Stroke, StylusParams, Surface, Touch, plan_sides, scan, see_markers, touch,
+    CameraParams, DrawnWorld, Habit, MeshSurface, PathParams, ScannerParams, SimError, SimWorld,
+    Stroke, StylusParams, Surface, Touch, TrueState, plan_sides, scan, see_markers, touch,
 };
 
 /// File of the true part, in the output folder.
@@ -188,7 +188,7 @@ pub(super) fn simulate(arguments: &SimulateArguments) -> Result<Losses, CliError
             drawn,
         },
     ) = (&arguments.out, world);
-    let Simulated { scan, touch } = write_simulation(
+    let SimulatedInput { scan, touch } = write_simulation(
         &surface,
         &truth,
         &path,
@@ -326,7 +326,7 @@ impl SimulationSettings {
 }
 
 /// Simulated scan and touch.
-pub(super) struct Simulated {
+pub(super) struct SimulatedInput {
     pub scan: TriMesh,
     pub touch: Touch,
 }
@@ -342,7 +342,7 @@ pub(super) fn write_simulation(
     stylus: &StylusParams,
     camera: Option<&CameraParams>,
     folder: &Path,
-) -> Result<Simulated, CliError> {
+) -> Result<SimulatedInput, CliError> {
     create_folder(folder).map_err(not_written(folder))?;
     let stage = WorkProgress::stage("scan");
     let scan = scan(surface, scanner)?;
@@ -368,11 +368,11 @@ pub(super) fn write_simulation(
     )
     .map_err(CliError::not_written)?;
     write_contacts(&touch.moments, &folder.join(CONTACTS_NAME))?;
-    Ok(Simulated { scan, touch })
+    Ok(SimulatedInput { scan, touch })
 }
 
 /// Writes the true ball centres and contact points: a line for each contact, mm, in O.
-fn write_contacts(moments: &[Moment], path: &Path) -> Result<(), CliError> {
+fn write_contacts(moments: &[TrueState], path: &Path) -> Result<(), CliError> {
     let touched = moments
         .iter()
         .step_by(CONTACT_EVERY)

@@ -14,7 +14,7 @@ use nalgebra::{Point3, Vector3};
 use serde::Deserialize;
 
 use touchup_method::haptic::{
-    Along, ContactModel, DynamicsError, DynamicsParams, FaceDynamics, FaceState, StepRule,
+    ContactModel, DynamicsError, DynamicsParams, FaceDynamics, FaceState, MotionDirection, StepRule,
 };
 
 /// Longest line of a sample, bytes.
@@ -35,7 +35,7 @@ struct StepQuestion {
     alpha_m_per_n_s: f64,
     beta_per_n2_s: f64,
     step: StepRule,
-    along: Along,
+    along: MotionDirection,
 }
 
 #[derive(Debug, thiserror::Error)]

@@ -15,7 +15,7 @@ use super::set_up::{set_up, set_up_on_page};
 use super::{notify, notify_with_code};
 use touchup_geometry::mesh::TriMesh;
 use touchup_io::mesh_file::MeshUnit;
-use touchup_node::node::Prepared;
+use touchup_node::node::PreparedNode;
 #[cfg(feature = "web")]
 use touchup_node::page::{Certificate, Invitation, NodeFacts, WebParams, WebServer};
 use touchup_node::ros::arguments::NodeConfig;
@@ -160,7 +160,7 @@ impl WebFlags {
         &self,
         _: Option<WebServer>,
         _: Option<TriMesh>,
-        _: &Prepared,
+        _: &PreparedNode,
         _: Inbox,
         network: Arc<dyn Port>,
     ) -> Result<(Arc<dyn Port>, Option<WebServer>), CliError> {
@@ -176,7 +176,7 @@ impl WebFlags {
         &self,
         opened: Option<WebServer>,
         nominal: Option<TriMesh>,
-        ready: &Prepared,
+        ready: &PreparedNode,
         inbox: Inbox,
         network: Arc<dyn Port>,
     ) -> Result<(Arc<dyn Port>, Option<WebServer>), CliError> {

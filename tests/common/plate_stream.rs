@@ -6,8 +6,8 @@ use std::sync::Mutex;
 use nalgebra::Isometry3;
 use touchup::mesh::TriMesh;
 use touchup::sim::{
-    Lines, PathParams, Plate, RasterRegion, ScannerParams, Stroke, StylusParams, Surface, Touch,
-    plan_demo, raster, scan, touch,
+    PathParams, Plate, RasterDirection, RasterRegion, ScannerParams, Stroke, StylusParams, Surface,
+    Touch, plan_demo, raster, scan, touch,
 };
 use touchup::stylus::{
     ContactEstimator, ContactEstimatorParams, ContactSample, Sample, SyncParams, Synchroniser,
@@ -49,7 +49,7 @@ fn path(stylus: &StylusParams) -> Vec<Stroke> {
         pitch: 1e-3,
         ..hand
     };
-    [Lines::AlongX, Lines::AlongY]
+    [RasterDirection::AlongX, RasterDirection::AlongY]
         .iter()
         .flat_map(|lines| raster(&region, *lines, &hand).unwrap())
         .collect()

@@ -1,4 +1,4 @@
-"""The bytes that tests/rooms/ros/messages.rs compares with are those of the messages as they are now."""
+"""The bytes that tests/ros/port/messages.rs compares with are those of the messages as they are now."""
 
 import json
 

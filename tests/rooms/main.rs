@@ -14,6 +14,8 @@ mod shapes;
 mod shared;
 #[path = "../common/soundness.rs"]
 mod soundness;
+#[path = "../common/static_scan.rs"]
+mod static_scan;
 
 mod align;
 mod allocation;
@@ -31,15 +33,9 @@ mod layers;
 mod light_touch;
 mod live;
 mod mesh;
-#[cfg(feature = "ros")]
-mod node;
 mod probing;
 mod reconstruct;
 mod refinement;
-#[cfg(feature = "ros")]
-mod ros;
-#[cfg(feature = "ros")]
-mod ros2_control;
 mod scene;
 mod sim;
 mod stylus;

@@ -7,7 +7,7 @@ use std::collections::BTreeSet;
 use nalgebra::vector;
 use proptest::prelude::*;
 use touchup::haptic::{
-    Along, ContactModel, DynamicsParams, RefineParams, RoiSize, StepRule, TipParams,
+    ContactModel, DynamicsParams, MotionDirection, RefineParams, RoiSize, StepRule, TipParams,
 };
 use touchup::io::mesh_file::MeshUnit;
 use touchup::io::recording::TableColumns;
@@ -432,7 +432,7 @@ refine: { mode: paper, contact_model: spring, alpha_m_per_n_s: 0.5, beta_per_n2_
     assert_eq!((alpha_m_per_n_s, beta_per_n2_s), (0.5, 0.0));
     assert_eq!(
         (rule, along, take_out_rigid_offset),
-        (StepRule::DriftCorrected, Along::Force, false)
+        (StepRule::DriftCorrected, MotionDirection::Force, false)
     );
     assert_eq!((params.roi, params.gate), (RoiSize::Radius(0.004), None));
 

@@ -10,7 +10,8 @@ use std::time::Duration;
 use nalgebra::Vector3;
 use touchup::clock::{Clock, ManualClock};
 use touchup::probing::arm::{
-    Arm, ArmError, Command, LimitError, ProbeError, Safety, TouchOutcome, TouchParams, Watched,
+    Arm, ArmError, Command, LimitError, ProbeError, Safety, SupervisedArm, TouchOutcome,
+    TouchParams,
 };
 use touchup::ur::{Halt, UrArm, UrError};
 
@@ -111,7 +112,7 @@ fn broken_off(arm: &mut UrArm, mut happen: impl FnMut()) -> ProbeError {
         seen: &mut seen,
         stop_request: || None,
     };
-    let mut watched = Watched::new(arm, limits(), &mut onlooker);
+    let mut watched = SupervisedArm::new(arm, limits(), &mut onlooker);
     let up = at([x, y, 200e-3]);
     let went = watched.line(
         "going up",
@@ -791,7 +792,7 @@ fn a_speed_slider_is_named_where_the_arm_does_not_arrive() {
             seen: |_: &_| {},
             stop_request: || None,
         };
-        let mut watched = Watched::new(&mut arm, limits(), &mut onlooker);
+        let mut watched = SupervisedArm::new(&mut arm, limits(), &mut onlooker);
         let up = at([PLACE[0], PLACE[1], 50e-3]);
         let error = watched
             .line(

@@ -21,8 +21,8 @@ use std::path::Path;
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use stand_in::{StandIn, limits, packages};
 use touchup::probing::arm::{
-    OnsetVerdict, ProbeError, StopRequest, TouchOutcome, TouchParams, TouchRecord, TouchTarget,
-    Watched,
+    OnsetVerdict, ProbeError, StopRequest, SupervisedArm, TouchOutcome, TouchParams, TouchRecord,
+    TouchTarget,
 };
 use touchup::sim::ArmParams;
 use touchup::ur::UrArm;
@@ -84,7 +84,7 @@ fn touched(arm: &mut UrArm, target: &TouchTarget) -> Result<TouchRecord, ProbeEr
         seen: |_: &_| {},
         stop_request: || None,
     };
-    let mut watched = Watched::new(arm, limits(), &mut onlooker);
+    let mut watched = SupervisedArm::new(arm, limits(), &mut onlooker);
     watched.zero()?;
     watched.touch(target, &TouchParams::default())
 }

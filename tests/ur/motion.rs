@@ -3,7 +3,7 @@
 use crate::Onlooker;
 use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
 use touchup::probing::arm::{
-    Arm, Command, ProbeError, SlideEnding, SlideTarget, StopRequest, TouchParams, Watched,
+    Arm, Command, ProbeError, SlideEnding, SlideTarget, StopRequest, SupervisedArm, TouchParams,
 };
 use touchup::probing::plan::Station;
 use touchup::sim::ArmParams;
@@ -27,7 +27,7 @@ fn a_line_ends_at_its_place_and_turn() {
             stop_request: || None,
         };
         stand_in.send("mark begin");
-        let mut watched = Watched::new(&mut arm, limits(), &mut onlooker);
+        let mut watched = SupervisedArm::new(&mut arm, limits(), &mut onlooker);
         watched.line("going there", &to, 50e-3, &TouchParams::default(), 5.0)?;
         watched.zero()?;
         let state = arm.next_state().unwrap();
@@ -97,7 +97,7 @@ fn a_slide_goes_over_a_rim() {
             seen: |_: &_| {},
             stop_request: || None,
         };
-        let mut watched = Watched::new(&mut arm, limits(), &mut onlooker);
+        let mut watched = SupervisedArm::new(&mut arm, limits(), &mut onlooker);
         watched.zero()?;
         let record = watched.slide(&target, &TouchParams::default())?;
         println!(
@@ -273,7 +273,7 @@ fn a_cancelled_move_brakes_to_rest() {
             seen: &mut seen,
             stop_request: asked,
         };
-        let mut watched = Watched::new(&mut arm, limits(), &mut onlooker);
+        let mut watched = SupervisedArm::new(&mut arm, limits(), &mut onlooker);
         let down = at([x, y, 30e-3]);
         let error = watched
             .line("going down", &down, 50e-3, &TouchParams::default(), 5.0)

@@ -10,7 +10,7 @@ use super::drawn_feature::{DrawnFeature, measured, shape_of};
 use super::source::inspected_file;
 use super::words::first_few;
 use touchup_features::conformity::{GeneralTolerance, ToleranceLimits};
-use touchup_features::features::{Feature, InspectedQuantity, Measured};
+use touchup_features::features::{Feature, InspectedQuantity, MeasuredValue};
 use touchup_io::features_file::{FeatureFile, FeatureRecord};
 use touchup_io::inspection_file::InspectedFile;
 use touchup_io::mesh_file::MeshUnit;
@@ -32,7 +32,7 @@ pub struct DrawingParams {
 }
 
 /// One characteristic and its limits.
-pub struct Drawn {
+pub struct DrawnCharacteristic {
     pub nominal: NominalRecord,
     pub quantity: InspectedQuantity,
     pub limits: ToleranceLimits,
@@ -46,7 +46,7 @@ pub struct Drawn {
 /// All characteristics of a part.
 pub struct PartDrawing {
     /// characteristics with their tolerances
-    pub characteristics: Vec<Drawn>,
+    pub characteristics: Vec<DrawnCharacteristic>,
     /// features whose places align drawing and part
     pub features: Vec<DrawnFeature>,
     /// file of the drawing
@@ -114,7 +114,7 @@ impl PartDrawing {
 }
 
 /// Loss of size by the facets of a CAD mesh; `None` without facets.
-fn facets_note(characteristics: &[Drawn]) -> Option<String> {
+fn facets_note(characteristics: &[DrawnCharacteristic]) -> Option<String> {
     let faceted = characteristics.iter().filter(|one| one.facets_mm > 0.0);
     let faceted: Vec<String> = faceted
         .map(|one| format!("{} {:.3} mm", one.nominal.name, one.facets_mm))
@@ -130,9 +130,9 @@ fn facets_note(characteristics: &[Drawn]) -> Option<String> {
 }
 
 /// Features of characteristics, and features that serve as datums alone.
-fn features_of_records(characteristics: &[Drawn]) -> Vec<DrawnFeature> {
+fn features_of_records(characteristics: &[DrawnCharacteristic]) -> Vec<DrawnFeature> {
     let mut features: Vec<(NominalRecord, DrawnFeature)> = Vec::new();
-    for Drawn {
+    for DrawnCharacteristic {
         nominal, quantity, ..
     } in characteristics
     {
@@ -203,7 +203,7 @@ fn drawn_feature(record: &NominalRecord) -> DrawnFeature {
 }
 
 /// Axis as a unit vector.
-fn axis_of(record: &NominalRecord) -> Option<Measured<Vector3<f64>>> {
+fn axis_of(record: &NominalRecord) -> Option<MeasuredValue<Vector3<f64>>> {
     Some(measured(
         Vector3::from(record.axis?).try_normalize(0.0)?,
         None,
@@ -228,7 +228,11 @@ fn features_of_shapes(found: &[FeatureRecord]) -> Vec<DrawnFeature> {
 }
 
 /// A characteristic with its own limits, or with the general tolerance.
-fn drawn(nominal: NominalRecord, facets_mm: f64, params: &DrawingParams) -> Result<Drawn, String> {
+fn drawn(
+    nominal: NominalRecord,
+    facets_mm: f64,
+    params: &DrawingParams,
+) -> Result<DrawnCharacteristic, String> {
     let quantity = nominal
         .quantity()
         .ok_or_else(|| format!("{}: no such quantity", nominal.name))?;
@@ -236,7 +240,7 @@ fn drawn(nominal: NominalRecord, facets_mm: f64, params: &DrawingParams) -> Resu
         NominalTolerance::Limits(limits) => (limits, "drawing".to_owned()),
         NominalTolerance::General => general_limits(&nominal, quantity, params)?,
     };
-    Ok(Drawn {
+    Ok(DrawnCharacteristic {
         nominal,
         quantity,
         limits,

@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use touchup_features::features::{Feature, FittedTo, Kind, Measured};
+use touchup_features::features::{Feature, FeatureKind, FittedTo, MeasuredValue};
 use touchup_io::features_file::FeatureRecord;
 
 /// A feature of the drawing.
@@ -37,7 +37,7 @@ pub(super) fn shape_of(record: &FeatureRecord) -> Option<Feature> {
     let size = |value: Option<f64>, name: &str| Some(measured(value? * 1e-3, std(name, 1e-3)));
     Some(Feature {
         id: record.id,
-        kind: Kind::of_name(&record.kind)?,
+        kind: FeatureKind::of_name(&record.kind)?,
         centre: measured(
             Point3::from(record.center_mm?) * 1e-3,
             std("center_mm", 1e-3),
@@ -58,6 +58,6 @@ pub(super) fn shape_of(record: &FeatureRecord) -> Option<Feature> {
 }
 
 /// A number or place with its standard uncertainty.
-pub(super) fn measured<T: Default>(value: T, std: Option<f64>) -> Measured<T> {
-    Measured::new(value, std, Vec::new())
+pub(super) fn measured<T: Default>(value: T, std: Option<f64>) -> MeasuredValue<T> {
+    MeasuredValue::new(value, std, Vec::new())
 }

@@ -6,7 +6,7 @@ use super::InspectionError;
 use super::calibration::calibration_of;
 use super::page::{ReportInput, page};
 use super::params::PartPicture;
-use super::rows::Inspected;
+use super::rows::Inspection;
 use super::source::InspectionSource;
 use touchup_io::file_error::FileError;
 use touchup_io::inspection_file::write_inspection_table;
@@ -51,7 +51,7 @@ impl ReportFiles {
     pub fn write(
         &self,
         source: &InspectionSource,
-        inspected: &Inspected,
+        inspected: &Inspection,
         picture: &PartPicture,
     ) -> Result<(), InspectionError> {
         let record = &inspected.record;

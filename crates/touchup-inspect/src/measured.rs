@@ -4,7 +4,9 @@ use nalgebra::{Point3, Vector3};
 
 use super::drawn_feature::measured;
 use touchup_features::conformity::{MeasuredNumber, place_number};
-use touchup_features::features::{FittedTo, InspectedQuantity, Kind, LEAST_TOUCHES, LEAST_TURN};
+use touchup_features::features::{
+    FeatureKind, FittedTo, InspectedQuantity, LEAST_TOUCHES, LEAST_TURN,
+};
 use touchup_io::features_file::{FeatureFile, FeatureRecord, RelationRecord};
 
 /// Measurement of a characteristic in a file.
@@ -74,7 +76,7 @@ pub(super) fn missing_touches(feature: &FeatureRecord, quantity: InspectedQuanti
 pub(super) fn measurement(
     file: &FeatureFile,
     feature: &FeatureRecord,
-    kind: Kind,
+    kind: FeatureKind,
     quantity: InspectedQuantity,
     nominal_mm: Option<[f64; 3]>,
     datum: Option<&FeatureRecord>,

@@ -7,7 +7,7 @@ use chrono::{DateTime, SecondsFormat, Utc};
 use nalgebra::Point3;
 
 use super::alignment::{Alignment, aligned};
-use super::drawing::{Drawn, PartDrawing};
+use super::drawing::{DrawnCharacteristic, PartDrawing};
 use super::drawn_feature::shape_of;
 use super::measured::{CharacteristicMeasurement, is_of_mesh, measurement, missing_touches};
 use super::source::InspectionSource;
@@ -38,7 +38,7 @@ pub struct Balloon {
 }
 
 /// A whole inspection, as shown.
-pub struct Inspected {
+pub struct Inspection {
     /// the record of the file
     pub record: InspectionRecord,
     /// numbered places in the picture
@@ -57,7 +57,7 @@ pub fn inspected(
     source: &InspectionSource,
     drawing: &PartDrawing,
     params: &InspectionParams,
-) -> Result<Inspected, InspectionError> {
+) -> Result<Inspection, InspectionError> {
     let drawn = &drawing.characteristics;
     let align = |method| aligned(&drawing.features, &source.features, method, params.match_mm);
     let alignment = params.align.as_ref().map(align).transpose()?;
@@ -104,7 +104,7 @@ pub fn inspected(
         (characteristics, alignment),
         &matched,
     );
-    Ok(Inspected {
+    Ok(Inspection {
         record,
         balloons,
         runs,
@@ -125,7 +125,7 @@ fn in_mesh(mm: [f64; 3], alignment: &Option<Alignment>) -> Option<[f64; 3]> {
 }
 
 /// Characteristics by feature of the drawing, in order of their first.
-fn groups_of(drawn: &[Drawn]) -> Vec<Vec<usize>> {
+fn groups_of(drawn: &[DrawnCharacteristic]) -> Vec<Vec<usize>> {
     let mut groups: Vec<Vec<usize>> = Vec::new();
     for (at, one) in drawn.iter().enumerate() {
         let same =
@@ -146,7 +146,7 @@ struct DrawingMatches {
 }
 
 fn match_all(
-    drawn: &[Drawn],
+    drawn: &[DrawnCharacteristic],
     groups: &[Vec<usize>],
     file: &FeatureFile,
     reach: f64,
@@ -155,7 +155,7 @@ fn match_all(
     let places: Vec<_> = shapes.map(|shape| FeaturePlace::of(&shape)).collect();
     let sought: Vec<_> = groups.iter().map(|group| sought_of(drawn, group)).collect();
     let features = match_features(&sought, &places, reach);
-    let datum = |one: &Drawn| {
+    let datum = |one: &DrawnCharacteristic| {
         let datum = one.nominal.datum.as_ref()?;
         let place = datum.center_mm.map(point);
         let sought = SoughtFeature {
@@ -176,7 +176,7 @@ fn point(mm: [f64; 3]) -> Point3<f64> {
     Point3::from(mm) * 1e-3
 }
 
-fn sought_of(drawn: &[Drawn], group: &[usize]) -> SoughtFeature {
+fn sought_of(drawn: &[DrawnCharacteristic], group: &[usize]) -> SoughtFeature {
     let first = &drawn[group[0]].nominal;
     let is_size = |at: &&usize| {
         matches!(
@@ -252,14 +252,14 @@ fn why_not(
 
 #[expect(clippy::too_many_lines)]
 fn characteristic(
-    drawn: &Drawn,
+    drawn: &DrawnCharacteristic,
     number: String,
     matched: &FeatureMatch,
     datum: &Option<FeatureMatch>,
     file: &FeatureFile,
     params: &InspectionParams,
 ) -> (CharacteristicRecord, Vec<[u32; 2]>) {
-    let Drawn {
+    let DrawnCharacteristic {
         nominal,
         quantity,
         limits,

@@ -12,7 +12,9 @@ use serde_json::Value;
 use super::file_error::{FileError, read_file, write_file};
 use touchup_features::conformity::MeasuredNumber;
 use touchup_features::features::clusters::{Bend, Cluster};
-use touchup_features::features::{Feature, Form, InspectedQuantity, Measured, Relation, relations};
+use touchup_features::features::{
+    Feature, Form, InspectedQuantity, MeasuredValue, Relation, relations,
+};
 use touchup_geometry::form::Deviation;
 
 /// Error of reading or writing a features file.
@@ -252,7 +254,11 @@ type KnownNumber<'a> = (&'static str, Option<f64>, &'a [u32]);
 
 /// The measured numbers of a feature.
 fn known(feature: &Feature) -> impl Iterator<Item = KnownNumber<'_>> {
-    fn note<'a, T>(name: &'static str, measured: &'a Measured<T>, unit: f64) -> KnownNumber<'a> {
+    fn note<'a, T>(
+        name: &'static str,
+        measured: &'a MeasuredValue<T>,
+        unit: f64,
+    ) -> KnownNumber<'a> {
         (name, measured.std.map(|std| std * unit), &measured.touches)
     }
     let centre = note("center_mm", &feature.centre, 1e3);

@@ -13,7 +13,7 @@ use serde::Deserialize;
 
 use super::file_error::{MAX_FILE_BYTES, read_up_to};
 use touchup_probing::arm::{Onset, TouchMoment, TouchOutcome};
-use touchup_probing::execute::{Probed, ProbedTouch};
+use touchup_probing::execute::{FlagResult, ProbedTouch};
 
 reported! {
     /// One line; lengths in mm of O, travel along the approach.
@@ -212,7 +212,7 @@ fn whole_lines(text: &[u8]) -> &[u8] {
 /// # Errors
 /// Any error of the file.
 pub fn append_probed_touches(
-    probed: &Probed,
+    probed: &FlagResult,
     ball_radius: f64,
     offset_ns: i64,
     path: &Path,

@@ -28,14 +28,14 @@ pub enum ResultTableError {
 
 /// One value.
 #[derive(Clone, Debug, PartialEq)]
-enum Cell {
+enum ResultCell {
     Number(f64),
     Count(i64),
     Flag(bool),
     Text(String),
 }
 
-impl Cell {
+impl ResultCell {
     fn to_json(&self) -> Value {
         match self {
             Self::Number(number) => Value::from(*number),
@@ -49,7 +49,7 @@ impl Cell {
 /// Columns of equal length; `None`: the row has no such value.
 #[derive(Debug, Default)]
 pub struct ResultTable {
-    columns: Vec<(String, Vec<Option<Cell>>)>,
+    columns: Vec<(String, Vec<Option<ResultCell>>)>,
     rows: usize,
 }
 
@@ -127,7 +127,7 @@ impl ResultTable {
         self.add_row(cells);
     }
 
-    fn add_row(&mut self, cells: Vec<(String, Cell)>) {
+    fn add_row(&mut self, cells: Vec<(String, ResultCell)>) {
         for (name, cell) in cells {
             let at = self
                 .columns
@@ -226,13 +226,13 @@ pub fn write_touches_as_named(
     }
 }
 
-fn text_of(cell: Option<&Cell>) -> String {
+fn text_of(cell: Option<&ResultCell>) -> String {
     match cell {
         None => String::new(),
-        Some(Cell::Number(number)) => number.to_string(),
-        Some(Cell::Count(count)) => count.to_string(),
-        Some(Cell::Flag(flag)) => flag.to_string(),
-        Some(Cell::Text(text)) => text.clone(),
+        Some(ResultCell::Number(number)) => number.to_string(),
+        Some(ResultCell::Count(count)) => count.to_string(),
+        Some(ResultCell::Flag(flag)) => flag.to_string(),
+        Some(ResultCell::Text(text)) => text.clone(),
     }
 }
 
@@ -243,27 +243,27 @@ pub(crate) fn cell_text(value: Option<&Value>) -> String {
     text_of(cells.first().map(|(_, cell)| cell))
 }
 
-fn touch_cell(name: &str, value: &str) -> Cell {
-    let count = || value.parse().map(Cell::Count).ok();
-    let number = || value.parse().map(Cell::Number).ok();
+fn touch_cell(name: &str, value: &str) -> ResultCell {
+    let count = || value.parse().map(ResultCell::Count).ok();
+    let number = || value.parse().map(ResultCell::Number).ok();
     let cell = match name {
-        "rejected" => Some(Cell::Flag(value == "1")),
+        "rejected" => Some(ResultCell::Flag(value == "1")),
         "touch" | "stamp_ns" | "stroke" => count(),
         _ => number(),
     };
-    cell.unwrap_or_else(|| Cell::Text(value.to_owned()))
+    cell.unwrap_or_else(|| ResultCell::Text(value.to_owned()))
 }
 
 /// Adds the values inside `value` by their names.
-fn flatten(name: &str, value: &Value, cells: &mut Vec<(String, Cell)>) {
+fn flatten(name: &str, value: &Value, cells: &mut Vec<(String, ResultCell)>) {
     let mut add = |cell| cells.push((name.to_owned(), cell));
     match value {
         Value::Null => {}
-        Value::Bool(flag) => add(Cell::Flag(*flag)),
-        Value::String(text) => add(Cell::Text(text.clone())),
+        Value::Bool(flag) => add(ResultCell::Flag(*flag)),
+        Value::String(text) => add(ResultCell::Text(text.clone())),
         Value::Number(number) => match number.as_i64() {
-            Some(count) => add(Cell::Count(count)),
-            None => add(Cell::Number(number.as_f64().unwrap_or(f64::NAN))),
+            Some(count) => add(ResultCell::Count(count)),
+            None => add(ResultCell::Number(number.as_f64().unwrap_or(f64::NAN))),
         },
         Value::Array(values) if values.len() == 3 && values.iter().all(Value::is_number) => {
             for (axis, value) in ["x", "y", "z"].into_iter().zip(values) {
@@ -271,7 +271,7 @@ fn flatten(name: &str, value: &Value, cells: &mut Vec<(String, Cell)>) {
             }
         }
         // keeps values of variable length as JSON
-        Value::Array(_) => add(Cell::Text(value.to_string())),
+        Value::Array(_) => add(ResultCell::Text(value.to_string())),
         Value::Object(values) => {
             for (key, value) in values {
                 let inner = if name.is_empty() {

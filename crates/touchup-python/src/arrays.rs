@@ -106,14 +106,14 @@ pub fn mesh_of(arrays: &MeshArrays<'_>, name: &str) -> Result<TriMesh, CliError>
 }
 
 /// A mesh without removed elements, as in a file, with the slot of each vertex.
-pub struct Compact {
+pub struct CompactMesh {
     vertices: Vec<[f64; 3]>,
     faces: Vec<[u32; 3]>,
     /// for each vertex its slot in the mesh
     slots: Vec<usize>,
 }
 
-impl Compact {
+impl CompactMesh {
     /// Vertices in use by faces, and the faces, in their order.
     pub fn of(mesh: &TriMesh) -> Self {
         const UNUSED: u32 = u32::MAX;
@@ -340,7 +340,7 @@ pub fn messages_into(
 }
 
 /// Name of an array, and its value for a touch.
-type Column<T> = (&'static str, fn(&ProbedPoint) -> T);
+type TouchColumn<T> = (&'static str, fn(&ProbedPoint) -> T);
 
 /// Touches as a dictionary of arrays, with the columns of [`touches_of`].
 ///
@@ -359,7 +359,7 @@ pub fn touches_array<'py>(
         "stroke",
         PyArray1::from_iter(py, touches.iter().map(|touch| touch.stroke)),
     )?;
-    let triples: [Column<[f64; 3]>; 3] = [
+    let triples: [TouchColumn<[f64; 3]>; 3] = [
         ("centre", |touch| touch.centre.coords.into()),
         ("point", |touch| touch.point.coords.into()),
         ("normal", |touch| touch.normal.into()),
@@ -367,7 +367,7 @@ pub fn touches_array<'py>(
     for (name, triple) in triples {
         into.set_item(name, matrix(py, touches.iter().map(triple).collect())?)?;
     }
-    let numbers: [Column<f64>; 5] = [
+    let numbers: [TouchColumn<f64>; 5] = [
         ("radius", |touch| touch.radius),
         ("sigma", |touch| touch.sigma),
         ("calibration_sigma", |touch| touch.calibration),

@@ -14,7 +14,7 @@ use touchup_session::replay::{RecordedAs, Recording};
 use touchup_session::scan::{Scan, read_scan};
 
 use crate::arrays::{
-    Compact, MeshArrays, PoseArrays, WrenchArrays, mesh_of, messages, messages_into,
+    CompactMesh, MeshArrays, PoseArrays, WrenchArrays, mesh_of, messages, messages_into,
     of_equal_length, touches_array, touches_of, wrench_frame,
 };
 use crate::failure::{at_work, exception, usage, warn};
@@ -52,7 +52,7 @@ pub fn read_mesh<'py>(py: Python<'py>, path: PathBuf, unit: &str) -> PyResult<Bo
         let columns = read_vertex_columns(&path, unit, &mesh, ["sigma_mm", "support"])?;
         Ok((mesh, repair.to_string(), columns))
     })?;
-    let compact = Compact::of(&mesh);
+    let compact = CompactMesh::of(&mesh);
     let [sigma, support] = columns;
     let into = PyDict::new(py);
     let sigma = sigma.map(|mm| {
@@ -78,7 +78,7 @@ pub fn read_mesh<'py>(py: Python<'py>, path: PathBuf, unit: &str) -> PyResult<Bo
 /// Those of NumPy.
 pub fn set_columns(
     into: &Bound<'_, PyDict>,
-    compact: &Compact,
+    compact: &CompactMesh,
     sigma: Option<&[f64]>,
     support: Option<&[u8]>,
 ) -> PyResult<()> {

@@ -45,7 +45,7 @@ mod _touchup {
     #[pymodule_export]
     use crate::measuring::{align, align_pairs, compare, features};
     #[pymodule_export]
-    use crate::refiner::{Refiner, Update};
+    use crate::refiner::{PyRefiner, PyUpdate};
     #[pymodule_export]
     use crate::refining::refine;
     #[pymodule_export]

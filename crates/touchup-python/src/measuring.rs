@@ -54,12 +54,12 @@ pub fn features(
 }
 
 /// A mesh and the tree over its faces.
-struct Indexed {
+struct SearchableMesh {
     mesh: TriMesh,
     tree: FaceTree,
 }
 
-impl Indexed {
+impl SearchableMesh {
     fn new(mesh: TriMesh) -> Self {
         Self {
             tree: FaceTree::new_by(&mesh, &Threads),
@@ -111,7 +111,7 @@ pub fn compare<'py>(
         UnlikeExtents::of(&mesh, &truth)
             .into_iter()
             .for_each(remark);
-        let (mesh, truth) = (Indexed::new(mesh), Indexed::new(truth));
+        let (mesh, truth) = (SearchableMesh::new(mesh), SearchableMesh::new(truth));
         let region = |number: &u8| match number {
             0 => SupportRegion::Untouched,
             1 => SupportRegion::Touched,
@@ -186,7 +186,7 @@ pub fn align<'py>(
         let unlike = UnlikeExtents::of(&source, &target)
             .filter(|unlike| matches!(unlike, UnlikeExtents::Size(_)));
         unlike.into_iter().for_each(remark);
-        let target = Indexed::new(target);
+        let target = SearchableMesh::new(target);
         match method {
             "icp" => {
                 let points: Vec<_> = spread(&source, POINTS, seed)
@@ -225,7 +225,7 @@ pub fn align<'py>(
 
 fn by_features(
     source: &TriMesh,
-    target: &Indexed,
+    target: &SearchableMesh,
     alternative: Option<usize>,
     seed: u64,
 ) -> Result<(Isometry3<f64>, serde_json::Value), CliError> {

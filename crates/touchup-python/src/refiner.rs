@@ -15,7 +15,7 @@ use touchup_method::stylus::{Sample, SampleError};
 use touchup_session::live::LiveError;
 use touchup_session::refinement::{Refinement, reason_of_refusal};
 
-use crate::arrays::{Compact, MeshArrays, of_equal_length, rows, sample, wrench_frame};
+use crate::arrays::{CompactMesh, MeshArrays, of_equal_length, rows, sample, wrench_frame};
 use crate::failure::{at_work, exception, usage};
 use crate::refining::{ScanSource, finish_refinement, refinement};
 use crate::scenes::source;
@@ -26,13 +26,13 @@ const CHUNK: usize = 1024;
 const REFUSED: u8 = 255;
 
 /// Effect of one sample.
-#[pyclass(frozen, module = "touchup")]
-pub struct Update {
+#[pyclass(frozen, name = "Update", module = "touchup")]
+pub struct PyUpdate {
     update: touchup_method::haptic::Update,
 }
 
 #[pymethods]
-impl Update {
+impl PyUpdate {
     /// "free", "mesh_only", "surface_only" or "both": whether contact is expected and measured
     #[getter]
     fn case(&self) -> &'static str {
@@ -86,7 +86,7 @@ impl Update {
     }
 }
 
-impl Update {
+impl PyUpdate {
     fn vector(&self, of: fn(&Mismatch) -> Vector3<f64>) -> Option<[f64; 3]> {
         self.update
             .mismatch
@@ -133,7 +133,7 @@ type SampleArrays<'py> = (
 
 /// Effects of many samples.
 #[derive(Default)]
-struct Pushed {
+struct UpdateArrays {
     case: Vec<u8>,
     face: Vec<i64>,
     distance: Vec<f64>,
@@ -141,7 +141,7 @@ struct Pushed {
     first_refusal: Option<(usize, String)>,
 }
 
-impl Pushed {
+impl UpdateArrays {
     fn with_capacity(count: usize) -> Self {
         let (case, face) = (Vec::with_capacity(count), Vec::with_capacity(count));
         Self {
@@ -189,8 +189,8 @@ impl Pushed {
 }
 
 /// Refines a scan sample by sample.
-#[pyclass(frozen, subclass, module = "touchup._touchup")]
-pub struct Refiner {
+#[pyclass(frozen, subclass, name = "Refiner", module = "touchup._touchup")]
+pub struct PyRefiner {
     state: Mutex<RefinerState>,
 }
 
@@ -218,7 +218,7 @@ impl RefinerState {
     }
 }
 
-impl Refiner {
+impl PyRefiner {
     /// Locks the state. Another thread may hold it at work, without need of the interpreter.
     fn locked(&self, py: Python<'_>) -> MutexGuard<'_, RefinerState> {
         match self.state.try_lock() {
@@ -312,7 +312,7 @@ impl<'a> SampleRows<'a> {
 }
 
 #[pymethods]
-impl Refiner {
+impl PyRefiner {
     #[new]
     #[pyo3(signature = (scene_text, scene_path, scan, scan_file, frame))]
     fn new(
@@ -355,7 +355,7 @@ impl Refiner {
         orientation_xyzw: &Bound<'_, PyAny>,
         force: &Bound<'_, PyAny>,
         torque: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<Option<Update>> {
+    ) -> PyResult<Option<PyUpdate>> {
         let torque = torque.map_or(Ok([0.0; 3]), |torque| numbers(torque, "torque"))?;
         let (position, force) = (numbers(position, "position")?, numbers(force, "force")?);
         let turn = numbers(orientation_xyzw, "orientation_xyzw")?;
@@ -364,7 +364,7 @@ impl Refiner {
             Err(error) => return Err(exception(py, LiveError::Refine(error.into()).into())),
         };
         self.in_use(py, |refinement| match refinement.push(&sample) {
-            Ok(update) => Ok(update.map(|update| Update { update })),
+            Ok(update) => Ok(update.map(|update| PyUpdate { update })),
             Err(error) => Err(exception(py, error.into())),
         })
     }
@@ -376,7 +376,7 @@ impl Refiner {
         samples: SampleArrays<'_>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let rows = SampleRows::of(&samples).map_err(|error| exception(py, error))?;
-        let mut pushed = Pushed::with_capacity(rows.len());
+        let mut pushed = UpdateArrays::with_capacity(rows.len());
         let mut chunk = Vec::with_capacity(CHUNK.min(rows.len()));
         for begin in (0..rows.len()).step_by(CHUNK) {
             py.check_signals()?;
@@ -421,7 +421,7 @@ impl Refiner {
 
     /// The current mesh.
     fn _mesh<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let compact = self.in_use(py, |refinement| Ok(Compact::of(refinement.mesh())))?;
+        let compact = self.in_use(py, |refinement| Ok(CompactMesh::of(refinement.mesh())))?;
         let into = PyDict::new(py);
         compact.into_dict(&into)?;
         Ok(into)

@@ -16,8 +16,8 @@ use touchup_session::scan::{read_scan, warn_of_left_out};
 use touchup_session::session::RefinedMesh;
 
 use crate::arrays::{
-    Compact, MeshArrays, MeshVecs, PoseArrays, WrenchArrays, mesh_vecs, messages, touches_array,
-    wrench_frame,
+    CompactMesh, MeshArrays, MeshVecs, PoseArrays, WrenchArrays, mesh_vecs, messages,
+    touches_array, wrench_frame,
 };
 use crate::failure::{at_work, exception, usage};
 use crate::files::{recorded_as, set_columns, unit_of};
@@ -81,9 +81,9 @@ pub fn refinement(
 }
 
 /// A refined scan and its report.
-pub struct Reported(RefinedScan);
+pub struct RefinementOutput(RefinedScan);
 
-impl Reported {
+impl RefinementOutput {
     /// The result as a dictionary of arrays.
     ///
     /// # Errors
@@ -98,7 +98,7 @@ impl Reported {
             ..
         } = mesh;
         let into = PyDict::new(py);
-        let compact = Compact::of(&mesh);
+        let compact = CompactMesh::of(&mesh);
         let support: Vec<u8> = support.iter().map(|support| *support as u8).collect();
         set_columns(&into, &compact, Some(&sigma), Some(&support))?;
         compact.into_dict(&into)?;
@@ -121,7 +121,7 @@ fn refined(
     scene: &SceneSource,
     touching: Touching,
     force: bool,
-) -> Result<Reported, CliError> {
+) -> Result<RefinementOutput, CliError> {
     let scan_name = match &scan {
         ScanSource::File(path, _) => path.clone(),
         ScanSource::Arrays(_) => shown(None, "the scan"),
@@ -156,7 +156,10 @@ fn refined(
 ///
 /// # Errors
 /// Those of [`refine`].
-pub fn finish_refinement(mut refinement: Refinement, force: bool) -> Result<Reported, CliError> {
+pub fn finish_refinement(
+    mut refinement: Refinement,
+    force: bool,
+) -> Result<RefinementOutput, CliError> {
     let (scan, recording) = (shown(None, "the scan"), shown(None, "the samples"));
     refinement.force(force);
     Ok(warned(refinement.finish(InputNames {
@@ -166,7 +169,7 @@ pub fn finish_refinement(mut refinement: Refinement, force: bool) -> Result<Repo
 }
 
 /// Logs findings and losses.
-fn warned(refined: RefinedScan) -> Reported {
+fn warned(refined: RefinedScan) -> RefinementOutput {
     let RefinedScan {
         summary, losses, ..
     } = &refined;
@@ -175,7 +178,7 @@ fn warned(refined: RefinedScan) -> Reported {
         .iter()
         .for_each(|finding| tracing::warn!("{finding}"));
     losses.iter().for_each(|loss| tracing::warn!("{loss}"));
-    Reported(refined)
+    RefinementOutput(refined)
 }
 
 /// Refines a scan by a recording, each from arrays or a file.

@@ -6,7 +6,7 @@ use touchup::cli::{CliError, OffFactor, ScannerKind, Side, Simulation, Simulatio
 use touchup_method::stylus::WrenchFrame;
 use touchup_sim::SimWorld;
 
-use crate::arrays::{Compact, MeshArrays, mesh_of, messages_into};
+use crate::arrays::{CompactMesh, MeshArrays, mesh_of, messages_into};
 use crate::failure::{at_work, exception, usage};
 
 /// Scans and touches a part like `touchup simulate`.
@@ -53,7 +53,7 @@ pub fn simulate<'py>(
         settings.simulated(&truth)
     })?;
     let [into, of_scan, recording] = [(); 3].map(|()| PyDict::new(py));
-    Compact::of(&scan).into_dict(&of_scan)?;
+    CompactMesh::of(&scan).into_dict(&of_scan)?;
     messages_into(&touch.messages, WrenchFrame::Sensor, &recording)?;
     into.set_item("scan", of_scan)?;
     into.set_item("recording", recording)?;

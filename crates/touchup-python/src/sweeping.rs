@@ -12,7 +12,7 @@ use touchup_session::sweep::{
     COVERAGE, GivenInput, JobReport, JobResult, JobRunner, JobsFile, SweepTables, WhatIf, tables_of,
 };
 
-use crate::arrays::{Compact, json as to_json};
+use crate::arrays::{CompactMesh, json as to_json};
 use crate::failure::at_work;
 use crate::files::set_columns;
 
@@ -126,7 +126,7 @@ fn moved_mesh<'py>(
     result: &JobResult,
     displaced: &[Displacement],
 ) -> PyResult<Bound<'py, PyDict>> {
-    let (into, compact) = (PyDict::new(py), Compact::of(&result.mesh));
+    let (into, compact) = (PyDict::new(py), CompactMesh::of(&result.mesh));
     let column = |of: fn(&Displacement) -> f64| {
         let values: Vec<f64> = displaced.iter().map(of).collect();
         compact

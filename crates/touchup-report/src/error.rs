@@ -10,7 +10,7 @@ use touchup_session::scene::SceneError;
 use touchup_sim::SimError;
 
 /// A measurement, or its error.
-pub type Measured<T> = Result<T, MeasureError>;
+pub type MeasureResult<T> = Result<T, MeasureError>;
 
 /// Reason for a missing measurement.
 #[derive(Debug, thiserror::Error)]

@@ -13,7 +13,7 @@
 use std::sync::LazyLock;
 
 use nalgebra::{DMatrix, DVector, Matrix2, Point3, Vector3};
-use touchup_method::haptic::{Along, ContactModel, DynamicsParams, FaceState};
+use touchup_method::haptic::{ContactModel, DynamicsParams, FaceState, MotionDirection};
 
 use super::double_double::Double2;
 
@@ -129,7 +129,7 @@ impl<'a> ForcePlane<'a> {
         } else {
             return None;
         };
-        let along_axis = if held.params.along == Along::Force {
+        let along_axis = if held.params.along == MotionDirection::Force {
             towards
         } else {
             normal

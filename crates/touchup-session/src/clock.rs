@@ -28,15 +28,15 @@ const HUNG: Duration = Duration::from_secs(120);
 #[derive(Clone, Debug, Default)]
 pub struct Clock {
     /// `None`: the steady clock of this machine
-    manual: Option<Arc<Manual>>,
+    manual: Option<Arc<ManualTime>>,
 }
 
 /// The control of a [`Clock::manual`].
 #[derive(Debug)]
-pub struct ManualClock(Arc<Manual>);
+pub struct ManualClock(Arc<ManualTime>);
 
 #[derive(Debug)]
-struct Manual {
+struct ManualTime {
     begun: Instant,
     is_lock_step: bool,
     waits: Mutex<Waits>,
@@ -55,7 +55,7 @@ struct Waits {
 
 /// Stops the time of a manual clock until dropped, or until its holder waits on that clock.
 #[derive(Debug)]
-pub struct Working(Option<Arc<Manual>>);
+pub struct WorkGuard(Option<Arc<ManualTime>>);
 
 impl Clock {
     /// The steady clock of this machine.
@@ -76,7 +76,7 @@ impl Clock {
 
     fn moved_by_hand(is_lock_step: bool) -> (Self, ManualClock) {
         let (waits, changed) = (Mutex::default(), Condvar::new());
-        let manual = Arc::new(Manual {
+        let manual = Arc::new(ManualTime {
             begun: Instant::now(),
             is_lock_step,
             waits,
@@ -91,11 +91,11 @@ impl Clock {
     }
 
     /// Registers a thread or task that time waits for. A thread that waits on the clock needs one.
-    pub fn begin_work(&self) -> Working {
+    pub fn begin_work(&self) -> WorkGuard {
         if let Some(manual) = &self.manual {
             manual.waits().workers += 1;
         }
-        Working(self.manual.clone())
+        WorkGuard(self.manual.clone())
     }
 
     /// Whether a test advances it.
@@ -210,12 +210,12 @@ impl ManualClock {
 
 /// A running wait; over when dropped.
 struct Wait<'a> {
-    manual: &'a Manual,
+    manual: &'a ManualTime,
     number: u64,
     deadline: Duration,
 }
 
-impl Manual {
+impl ManualTime {
     fn waits(&self) -> MutexGuard<'_, Waits> {
         locked(&self.waits)
     }
@@ -278,7 +278,7 @@ impl Drop for Wait<'_> {
     }
 }
 
-impl Drop for Working {
+impl Drop for WorkGuard {
     fn drop(&mut self) {
         if let Some(manual) = &self.0 {
             manual.waits().workers -= 1;

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::sync::{Mutex, PoisonError};
 use std::thread::{Builder, available_parallelism, scope};
 
-use touchup_geometry::mesh::{Job, Workers};
+use touchup_geometry::mesh::{Task, Workers};
 
 /// Priority steps below the ordinary threads (setpriority(2)): with a third of their share the work
 /// still finishes on a busy machine.
@@ -32,7 +32,7 @@ impl Workers for Threads {
         available_parallelism().map_or(1, usize::from)
     }
 
-    fn run(&self, jobs: Vec<Job<'_>>) {
+    fn run(&self, jobs: Vec<Task<'_>>) {
         let helpers = self.count().min(jobs.len()).saturating_sub(1);
         let left = Mutex::new(VecDeque::from(jobs));
         let next = || {

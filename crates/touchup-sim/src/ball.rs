@@ -41,7 +41,7 @@ pub(super) struct TipBall {
 }
 
 /// The plane that keeps the ball outside one piece of the surface: normal · centre ≥ level.
-struct ContactPlane {
+struct BallConstraint {
     point: Point3<f64>,
     normal: Vector3<f64>,
     level: f64,
@@ -108,10 +108,10 @@ pub(super) fn push_balls(
     (*from, Vec::new())
 }
 
-fn plane(middle: &Point3<f64>, s: &SurfacePoint, ball: &TipBall) -> Option<ContactPlane> {
+fn plane(middle: &Point3<f64>, s: &SurfacePoint, ball: &TipBall) -> Option<BallConstraint> {
     let normal = (middle - s.point).try_normalize(0.0)?;
     let level = normal.dot(&s.point.coords) + ball.radius - normal.dot(&ball.offset);
-    Some(ContactPlane {
+    Some(BallConstraint {
         point: s.point,
         normal,
         level,
@@ -123,10 +123,10 @@ fn plane(middle: &Point3<f64>, s: &SurfacePoint, ball: &TipBall) -> Option<Conta
 ///
 /// Active set: the most violated plane joins, planes that no longer push leave, until none is
 /// violated.
-fn nearest_in_front(planes: &mut [ContactPlane], to: &Point3<f64>) -> Point3<f64> {
+fn nearest_in_front(planes: &mut [BallConstraint], to: &Point3<f64>) -> Point3<f64> {
     let (mut x, mut active) = (*to, Vec::new());
     for _ in 0..JOINS {
-        let slack = |p: &ContactPlane| p.normal.dot(&x.coords) - p.level;
+        let slack = |p: &BallConstraint| p.normal.dot(&x.coords) - p.level;
         let worst =
             (0..planes.len()).min_by(|&a, &b| slack(&planes[a]).total_cmp(&slack(&planes[b])));
         let Some(worst) = worst.filter(|&w| slack(&planes[w]) < -BROKEN && !active.contains(&w))
@@ -150,7 +150,7 @@ fn nearest_in_front(planes: &mut [ContactPlane], to: &Point3<f64>) -> Point3<f64
 /// The same for at most four planes, by trying every three, two and one of them; with the shares of
 /// the pushing planes.
 fn nearest_in_front_of_few(
-    planes: &[ContactPlane],
+    planes: &[BallConstraint],
     few: &[usize],
     to: &Point3<f64>,
 ) -> Option<BallRest> {
@@ -195,7 +195,7 @@ fn nearest_in_front_of_few(
 }
 
 /// The pushing planes; pieces of the surface that meet in one point count once.
-fn contacts(planes: &[ContactPlane]) -> Vec<BallContact> {
+fn contacts(planes: &[BallConstraint]) -> Vec<BallContact> {
     let hardest = planes.iter().map(|p| p.held_back).fold(0.0, f64::max);
     let mut contacts: Vec<BallContact> = Vec::new();
     for p in planes.iter().filter(|p| p.held_back > IDLE * hardest) {

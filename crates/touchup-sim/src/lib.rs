@@ -34,12 +34,13 @@ pub use markers::{CameraParams, see_markers};
 pub use mistake::{INPUT_MISTAKES, InputMistake, ToldRecording};
 pub use paths::habit::Habit;
 pub use paths::path::{
-    Lines, PathParams, RasterRegion, Stroke, around_wall, plan_demo, plan_mesh, plan_walls, raster,
+    PathParams, RasterDirection, RasterRegion, Stroke, around_wall, plan_demo, plan_mesh,
+    plan_walls, raster,
 };
 pub use paths::sides::plan_sides;
 pub use paths::waterline::plan_waterlines;
 pub use scanner::{ScanQuality, ScannerParams, measure_quality, scan};
-pub use sensor::{Moment, SensorParams};
+pub use sensor::{SensorParams, TrueState};
 pub use stylus::{StylusParams, Touch, touch};
 pub use surfaces::mesh_surface::MeshSurface;
 pub use surfaces::peaks::{Peaks, add_vertex_noise};
@@ -47,4 +48,4 @@ pub use surfaces::plate::{Plate, PlateStadium, TruthFeature, TruthShape};
 pub use surfaces::surface::{Bounds, Surface, SurfacePoint};
 pub use surfaces::wavy;
 pub use surfaces::with_spheres::WithSpheres;
-pub use world::{CalibrationStds, DrawnValue, DrawnWorld, SimWorld, Told, ToldOff};
+pub use world::{CalibrationStds, DrawnValue, DrawnWorld, ReportedWorld, SimWorld, ToldOff};

@@ -7,7 +7,7 @@ use rand_pcg::Pcg64;
 
 use super::error::{SimError, positive, up_to};
 use super::random::{gauss_vector, uniform};
-use super::sensor::{Moment, TICK};
+use super::sensor::{TICK, TrueState};
 use touchup_method::stylus::{MarkerBody, MarkerFrame, MarkerObservation};
 
 settings! {
@@ -72,7 +72,7 @@ impl Spell {
 /// # Errors
 /// [`SimError::BadParameter`].
 pub fn see_markers(
-    moments: &[Moment],
+    moments: &[TrueState],
     stiffness: f64,
     camera: &CameraParams,
     seed: u64,

@@ -13,7 +13,7 @@ use super::error::{SimError, not_negative, positive, up_to};
 use super::random::{gauss, gauss_vector, uniform};
 use crate::paths::path::looking_along;
 use crate::surfaces::contour::{MeshDraft, contour};
-use crate::surfaces::field::Field;
+use crate::surfaces::field::GridField;
 use crate::surfaces::surface::Surface;
 use touchup_geometry::mesh::TriMesh;
 use touchup_geometry::numeric::weighted_quantile;
@@ -186,7 +186,7 @@ fn lose_place_mut(soup: &mut MeshDraft, radius: f64, rng: &mut Pcg64) {
 }
 
 /// Fills the defects of the surface.
-fn repair_mut(soup: &mut MeshDraft, field: &Field) {
+fn repair_mut(soup: &mut MeshDraft, field: &GridField) {
     soup.drop_folds_mut(field);
     soup.tidy_mut();
     soup.fill_mut(LONGEST_FILLED);
@@ -198,7 +198,7 @@ fn scanned_field(
     params: &ScannerParams,
     frame_ov: &Isometry3<f64>,
     rng: &mut Pcg64,
-) -> Result<Field, SimError> {
+) -> Result<GridField, SimError> {
     let pitch = params.edge / NODES_PER_EDGE;
     let band = params.band();
     let bounds = surface.bounds().seen_from(frame_ov).grown(band);
@@ -216,7 +216,7 @@ fn scanned_field(
             limit: MAX_NODES,
         });
     }
-    let mut field = Field::of_surface(surface, frame_ov, [bounds.min, bounds.max], pitch, band);
+    let mut field = GridField::of_surface(surface, frame_ov, [bounds.min, bounds.max], pitch, band);
     field.close_mut(params.closes_holes_below / 2.0);
     field.blur_mut(params.rounding);
     let waves = Waves::new(params, pitch, rng);
@@ -270,7 +270,7 @@ impl Waves {
 
     /// Mean and standard deviation over the nodes at the field's zero level: they make noise and
     /// bias of every seed exactly as set.
-    fn spread(&self, field: &mut Field) -> (f64, f64) {
+    fn spread(&self, field: &mut GridField) -> (f64, f64) {
         let mut found = Vec::new();
         let pitch = field.pitch;
         self.for_each_near(field, pitch, |_, wave| found.push(wave));
@@ -282,7 +282,7 @@ impl Waves {
 
     /// Calls `f(value of the field, sum of the waves)` for every node whose value is less than
     /// `level` from zero.
-    fn for_each_near(&self, field: &mut Field, level: f64, mut f: impl FnMut(&mut f64, f64)) {
+    fn for_each_near(&self, field: &mut GridField, level: f64, mut f: impl FnMut(&mut f64, f64)) {
         for (first, values) in field.runs_mut(RUN) {
             if values.iter().any(|value| value.abs() < level) {
                 let sums = self.along(&first);
@@ -317,7 +317,7 @@ fn sight_pairs(baseline: f64) -> Vec<[Vector3<f64>; 2]> {
 
 /// Whether both lines of a pair reach a face.
 fn is_triangulated(
-    field: &Field,
+    field: &GridField,
     [a, b, c]: &[Point3<f64>; 3],
     pairs: &[[Vector3<f64>; 2]],
 ) -> bool {
@@ -336,7 +336,7 @@ fn is_triangulated(
 }
 
 /// Whether a face looks towards the scanner without occlusion.
-fn is_seen(field: &Field, [a, b, c]: &[Point3<f64>; 3]) -> bool {
+fn is_seen(field: &GridField, [a, b, c]: &[Point3<f64>; 3]) -> bool {
     let middle = Point3::from((a.coords + b.coords + c.coords) / 3.0);
     let Some(normal) = field.gradient(&middle).try_normalize(0.0) else {
         return false;

@@ -15,7 +15,7 @@ use touchup_method::stylus::{Message, StampedPose, StampedWrench, Wrench};
 
 /// The true state at one instant.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Moment {
+pub struct TrueState {
     /// Time since the start, s.
     pub t: f64,
     /// True centre of the ball and true orientation of the stylus.
@@ -168,7 +168,7 @@ impl<'a> Sensor<'a> {
     }
 
     /// All messages, in order of arrival.
-    pub(super) fn record(mut self, moments: &[Moment]) -> Vec<Message> {
+    pub(super) fn record(mut self, moments: &[TrueState]) -> Vec<Message> {
         let p = self.params;
         let silent = Wire {
             period: 0.0,
@@ -228,7 +228,7 @@ impl<'a> Sensor<'a> {
     }
 
     /// The reported pose: of a stylus without bending, in the frame of the recorded poses.
-    fn pose(&mut self, moment: &Moment) -> Isometry3<f64> {
+    fn pose(&mut self, moment: &TrueState) -> Isometry3<f64> {
         let p = self.params;
         let bend = self.tip.bend(&moment.pose_ot.rotation, &moment.force_o);
         let bent = moment.pose_ot.translation.vector - bend;
@@ -241,7 +241,7 @@ impl<'a> Sensor<'a> {
     }
 
     /// The reported wrench: in T, about the ball's centre, through which every contact force goes.
-    fn wrench(&mut self, moment: &Moment) -> Wrench {
+    fn wrench(&mut self, moment: &TrueState) -> Wrench {
         let p = self.params;
         let bias = Vector3::from_fn(|i, _| self.bias[i].at(moment.t)) * p.force_bias + p.tare;
         let felt = moment.pose_ot.rotation.inverse() * moment.force_o;
@@ -293,7 +293,7 @@ fn nanoseconds(count: u64, rate: f64) -> u64 {
 
 /// State at a time after the start: all but the contacts is interpolated between two moments.
 /// `None` past the last.
-fn moment_at(moments: &[Moment], at_ns: u64) -> Option<Moment> {
+fn moment_at(moments: &[TrueState], at_ns: u64) -> Option<TrueState> {
     let before = moments.get((at_ns / TICK_NS) as usize)?;
     let share = (at_ns % TICK_NS) as f64 / TICK_NS as f64;
     if share == 0.0 {
@@ -313,7 +313,7 @@ fn moment_at(moments: &[Moment], at_ns: u64) -> Option<Moment> {
             .nlerp(&after.pose_ot.rotation, share),
     );
     let force_o = before.force_o.lerp(&after.force_o, share);
-    Some(Moment {
+    Some(TrueState {
         t: before.t + share * TICK,
         pose_ot,
         force_o,

@@ -14,7 +14,7 @@ use super::ball::BallContact;
 use super::bending::TipBending;
 use super::error::{SimError, not_negative, positive, up_to};
 use super::random::{Drift, SmoothField};
-use super::sensor::{Moment, Sensor, SensorParams, TICK};
+use super::sensor::{Sensor, SensorParams, TICK, TrueState};
 use super::tip::SimTip;
 use crate::paths::path::{Stroke, free};
 use crate::surfaces::surface::{Bounds, Surface};
@@ -105,7 +105,7 @@ pub struct Touch {
     /// Messages in order of arrival: poses in O, wrenches in T.
     pub messages: Vec<Message>,
     /// One for each tick of 1 ms.
-    pub moments: Vec<Moment>,
+    pub moments: Vec<TrueState>,
 }
 
 /// Maximum force of a hand, N; a sample may hold a hundred times as much.
@@ -163,8 +163,8 @@ impl Hand {
     }
 }
 
-/// The ball in the hand, in motion.
-struct Leading<'a> {
+/// State of a simulated touch: the ball in the hand, in motion.
+struct TouchSimulation<'a> {
     surface: &'a dyn Surface,
     params: &'a StylusParams,
     hand: Hand,
@@ -174,7 +174,7 @@ struct Leading<'a> {
     centre: Point3<f64>,
     climbing: bool,
     firmness: f64,
-    moments: Vec<Moment>,
+    moments: Vec<TrueState>,
 }
 
 /// Leads a ball along `path` over `surface` and records the stylus' messages.
@@ -208,7 +208,7 @@ pub fn touch(
         .find_map(|s| s.press)
         .map_or_else(Vector3::z, |press| -press.into_inner());
     let upright = turned_to(&shaft);
-    let mut leading = Leading {
+    let mut leading = TouchSimulation {
         surface,
         params,
         hand: Hand::new(seed),
@@ -242,7 +242,7 @@ pub fn touch(
     Ok(Touch { messages, moments })
 }
 
-impl Leading<'_> {
+impl TouchSimulation<'_> {
     /// Whether a point is outside of the box around the surface.
     fn is_beside(&self, p: &Point3<f64>) -> bool {
         let Bounds { min, max } = self.surface.bounds();
@@ -401,7 +401,7 @@ impl Leading<'_> {
         };
         let force_o = contacts.iter().map(force).sum::<Vector3<f64>>() * (wanted * self.firmness);
         let pose_ot = Isometry3::from_parts(self.centre.coords.into(), orientation);
-        self.moments.push(Moment {
+        self.moments.push(TrueState {
             t,
             pose_ot,
             force_o,

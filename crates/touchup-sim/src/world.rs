@@ -1,6 +1,6 @@
 //! Named worlds: each draws its own truth from a seed, and a calibration's report of it.
 //!
-//! The reported values have Gaussian errors with known standard deviations ([`Told`]). The recorded
+//! The reported values have Gaussian errors with known standard deviations ([`ReportedWorld`]). The recorded
 //! poses have a frame of their own, the origin of a tracked body, so that a report needs the place
 //! of the part, the offset of the tip, the delay of the clocks and the tare. A world shares nothing
 //! with the defaults of scanner and stylus.
@@ -131,7 +131,7 @@ impl ToldOff {
 
 /// A calibration's report of a world: the input of the program.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Told {
+pub struct ReportedWorld {
     /// Radius of the ball, m.
     pub radius: f64,
     /// One stiffness for all directions, N/m.
@@ -150,7 +150,7 @@ pub struct Told {
     pub stds: CalibrationStds,
 }
 
-impl Told {
+impl ReportedWorld {
     /// Standard deviation along an axis of the error of tip offset and scan placement together, m.
     ///
     /// - `lever`: root mean square distance of the surface from O's origin, m.
@@ -197,7 +197,7 @@ pub struct DrawnWorld {
     /// habit of the hand
     pub habit: Habit,
     /// input of the program
-    pub told: Told,
+    pub told: ReportedWorld,
     /// each number once
     pub values: Vec<DrawnValue>,
 }
@@ -444,7 +444,7 @@ impl Draw {
         stds: &CalibrationStds,
         off: &ToldOff,
         seed: u64,
-    ) -> Told {
+    ) -> ReportedWorld {
         let mut rng = Pcg64::seed_from_u64(seed ^ TOLD_STREAM);
         let sensor = &stylus.sensor;
         let radius = stylus.radius + gauss(&mut rng) * stds.radius * off.radius;
@@ -463,7 +463,7 @@ impl Draw {
         self.told("wrench_clock", wrench_clock, stds.clock);
         self.told("scan_noise", scan_noise, stds.scan_noise * scanner.noise);
         let scan_to_space = sensor.scan_to_space * Isometry3::from_parts(shift.into(), turn);
-        Told {
+        ReportedWorld {
             radius,
             stiffness,
             tip_offset,
@@ -640,7 +640,7 @@ impl DrawnWorld {
     }
 
     /// Root mean square distance of the corners of a part's box from O's origin, m: the lever of
-    /// [`Told::place_std`].
+    /// [`ReportedWorld::place_std`].
     pub fn lever(surface: &dyn Surface) -> f64 {
         let bounds = surface.bounds();
         let corner = |i: usize| {

@@ -5,7 +5,7 @@ use crate::{number, vector};
 use arbitrary::{Result, Unstructured};
 use nalgebra::{Point3, Vector3};
 use touchup_method::haptic::{
-    Along, ContactModel, DynamicsParams, FaceDynamics, FaceState, StepRule,
+    ContactModel, DynamicsParams, FaceDynamics, FaceState, MotionDirection, StepRule,
 };
 
 fn step(bytes: &mut Unstructured) -> Result<()> {
@@ -36,7 +36,7 @@ fn step(bytes: &mut Unstructured) -> Result<()> {
         alpha_m_per_n_s: number(bytes, 0.1)?,
         beta_per_n2_s: number(bytes, 10.0)?,
         rule: *bytes.choose(&rules)?,
-        along: *bytes.choose(&[Along::InitialNormal, Along::Force])?,
+        along: *bytes.choose(&[MotionDirection::InitialNormal, MotionDirection::Force])?,
         take_out_rigid_offset: bytes.arbitrary()?,
     };
     let Ok(dynamics) = FaceDynamics::new(params) else {

@@ -9,7 +9,7 @@ use tracing::warn;
 
 use crate::cli::{CliError, Losses, check_kept, not_written, print_report};
 use touchup_io::atomic::write_atomically;
-use touchup_session::calibration::{Calibrated, Calibration, calibrated_scene};
+use touchup_session::calibration::{Calibration, CalibrationResult, calibrated_scene};
 use touchup_session::scene::Scene;
 
 /// Error message for a calibration with an arm but no scene.
@@ -75,7 +75,7 @@ impl CalibrationTarget {
     pub fn write(
         &self,
         draft: &DraftScene,
-        calibration: Calibration<impl Calibrated>,
+        calibration: Calibration<impl CalibrationResult>,
     ) -> Result<Losses, CliError> {
         let Calibration {
             found,

@@ -10,7 +10,7 @@ use tracing::warn;
 use crate::cli::progress::WorkProgress;
 use crate::cli::{CliError, counted, print_report, reported};
 use touchup_features::align::{
-    Alternative, FeaturesError, FeaturesParams, FreeTurn, IcpFit, IcpParams, Motion,
+    Alternative, FeaturesError, FeaturesParams, FreeTurn, IcpFit, IcpMotion, IcpParams,
     OrientedSample, PairsParams, Surfaces, align_features, fit_pairs, icp,
 };
 use touchup_features::compare::{IndexedMesh, sample_surface, surface_area};
@@ -26,7 +26,7 @@ const POINTS_EACH: f64 = 20_000.0;
 
 /// Alignment in the output of `--json`.
 #[derive(Debug, Default, Serialize)]
-pub(super) struct Alignment {
+pub(super) struct AlignmentReport {
     method: &'static str,
     #[serde(flatten)]
     motion: MotionReport,
@@ -38,12 +38,12 @@ pub(super) struct Alignment {
     fit: Option<FitReport>,
     /// By features.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
-    explained: Option<Explained>,
+    explained: Option<AlignmentEvidence>,
     /// Residual of each pair.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     residuals: Vec<Residual>,
     /// Small motions without effect on the fit.
-    undetermined: Vec<Loose>,
+    undetermined: Vec<UndeterminedMotionReport>,
 }
 
 reported! {
@@ -66,7 +66,7 @@ reported! {
 }
 
 reported! {
-    struct Explained, fn of(alternative: &Alternative, counts: [usize; 2]) {
+    struct AlignmentEvidence, fn of(alternative: &Alternative, counts: [usize; 2]) {
         /// Features of the mesh that coincide with a feature of the truth.
         explained_features: usize = alternative.explained.len(),
         mesh_features: usize = counts[0],
@@ -87,7 +87,7 @@ reported! {
 
 reported! {
     /// Unconstrained motion: a shift along and a turn about a point.
-    struct Loose, fn of(motion: &Motion, fit: &IcpFit) {
+    struct UndeterminedMotionReport, fn of(motion: &IcpMotion, fit: &IcpFit) {
         /// Shift of the point `about_mm`, times any length.
         shift: [f64; 3] = motion.shift.into(),
         /// Direction of the axis, times an angle per mm of the shift.
@@ -99,8 +99,8 @@ reported! {
 reported! {
     /// Alternative motions for the user's choice.
     struct Choices, fn of(alternatives: &[Alternative], counts: [usize; 2], error: &FeaturesError) {
-        ambiguous: Vec<Choice> =
-            (1..).zip(alternatives).map(|(number, one)| Choice::of(number, one, counts)).collect(),
+        ambiguous: Vec<AlternativeReport> =
+            (1..).zip(alternatives).map(|(number, one)| AlternativeReport::of(number, one, counts)).collect(),
         /// Axis of the free turn of each motion.
         free_turn?: FreeTurnReport = match error {
             FeaturesError::FreeTurn { turn, .. } => Some(FreeTurnReport::of(turn)),
@@ -117,13 +117,13 @@ reported! {
 }
 
 reported! {
-    struct Choice, fn of(number: usize, found: &Alternative, counts: [usize; 2]) {
+    struct AlternativeReport, fn of(number: usize, found: &Alternative, counts: [usize; 2]) {
         /// Number for --alternative.
         alternative: usize = number,
         #[serde(flatten)]
         motion: MotionReport = MotionReport::of(&found.source_to_target),
         #[serde(flatten)]
-        explained: Explained = Explained::of(found, counts),
+        explained: AlignmentEvidence = AlignmentEvidence::of(found, counts),
         rms_mm: Option<f64> = found.icp.as_ref().map(|fit| fit.rms * 1e3),
         /// Turn relative to the first.
         turn_deg: f64 = found.differs[0].norm().to_degrees(),
@@ -133,13 +133,13 @@ reported! {
     }
 }
 
-type Aligned = Result<(Isometry3<f64>, Option<Alignment>), CliError>;
+type AlignmentResult = Result<(Isometry3<f64>, Option<AlignmentReport>), CliError>;
 
 /// Motion that aligns `mesh` to the truth from roughly in place, and its report.
 ///
 /// # Errors
 /// [`CliError`].
-pub(super) fn aligned_by_icp(mesh: &TriMesh, truth: IndexedMesh<'_>, seed: u64) -> Aligned {
+pub(super) fn aligned_by_icp(mesh: &TriMesh, truth: IndexedMesh<'_>, seed: u64) -> AlignmentResult {
     let _aligning = WorkProgress::stage("align");
     let points: Vec<_> = spread(mesh, POINTS, seed).iter().map(|p| p.point).collect();
     let fit = icp(
@@ -150,7 +150,7 @@ pub(super) fn aligned_by_icp(mesh: &TriMesh, truth: IndexedMesh<'_>, seed: u64) 
         &IcpParams::default(),
         &Threads,
     )?;
-    let alignment = Alignment::of_icp("icp", &fit, points.len());
+    let alignment = AlignmentReport::of_icp("icp", &fit, points.len());
     alignment.warn();
     Ok((fit.source_to_target, Some(alignment)))
 }
@@ -167,7 +167,7 @@ pub(super) fn aligned_by_features(
     seed: u64,
     alternative: Option<usize>,
     json: bool,
-) -> Aligned {
+) -> AlignmentResult {
     let _aligning = WorkProgress::stage("align by features");
     let own = detect(mesh, &[]).features;
     let theirs = detect(truth.mesh, &[]).features;
@@ -204,11 +204,11 @@ pub(super) fn aligned_by_features(
         }
     };
     let alignment = match &chosen.icp {
-        Some(fit) => Alignment::of_icp("features", fit, points.len()),
-        None => Alignment::of("features", &chosen.source_to_target),
+        Some(fit) => AlignmentReport::of_icp("features", fit, points.len()),
+        None => AlignmentReport::of("features", &chosen.source_to_target),
     };
-    let alignment = Alignment {
-        explained: Some(Explained::of(chosen, counts)),
+    let alignment = AlignmentReport {
+        explained: Some(AlignmentEvidence::of(chosen, counts)),
         ..alignment
     };
     alignment.warn();
@@ -219,7 +219,7 @@ pub(super) fn aligned_by_features(
 ///
 /// # Errors
 /// [`CliError`], [`CliError::calibration`].
-pub(super) fn aligned_by_pairs(path: &Path) -> Aligned {
+pub(super) fn aligned_by_pairs(path: &Path) -> AlignmentResult {
     let file = read_pairs(path)?;
     let fit = fit_pairs(&file.pairs, &PairsParams::default())
         .map_err(|error| CliError::calibration(path, error))?;
@@ -236,10 +236,10 @@ pub(super) fn aligned_by_pairs(path: &Path) -> Aligned {
         .zip(&fit.residuals)
         .map(|(name, residual)| Residual::of(name, residual))
         .collect();
-    let alignment = Alignment {
+    let alignment = AlignmentReport {
         residuals,
         rms_mm: Some(fit.rms * 1e3),
-        ..Alignment::of("pairs", &fit.motion)
+        ..AlignmentReport::of("pairs", &fit.motion)
     };
     Ok((fit.motion, Some(alignment)))
 }
@@ -270,7 +270,7 @@ pub(super) fn moved(mesh: &TriMesh, pose: &Isometry3<f64>) -> TriMesh {
     moved
 }
 
-impl Alignment {
+impl AlignmentReport {
     fn of(method: &'static str, motion: &Isometry3<f64>) -> Self {
         Self {
             method,
@@ -285,7 +285,7 @@ impl Alignment {
             fit: Some(FitReport::of(fit, points)),
             undetermined: fit
                 .undetermined()
-                .map(|motion| Loose::of(motion, fit))
+                .map(|motion| UndeterminedMotionReport::of(motion, fit))
                 .collect(),
             ..Self::of(method, &fit.source_to_target)
         }
@@ -324,7 +324,7 @@ impl Alignment {
     }
 }
 
-impl fmt::Display for Alignment {
+impl fmt::Display for AlignmentReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [x, y, z] = self.motion.translation_mm;
         write!(
@@ -349,7 +349,7 @@ impl fmt::Display for Alignment {
                 "\n  pair {pair}: off by ({x:.3}, {y:.3}, {z:.3}) mm, {distance_mm:.3} mm"
             )?;
         }
-        for Loose {
+        for UndeterminedMotionReport {
             shift,
             turn_rad_per_mm,
             about_mm,
@@ -366,7 +366,7 @@ impl fmt::Display for Alignment {
     }
 }
 
-impl fmt::Display for Explained {
+impl fmt::Display for AlignmentEvidence {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
@@ -405,7 +405,7 @@ impl fmt::Display for Choices {
             let three = |v: &[f64; 3], digits: usize| {
                 format!("{:.digits$} {:.digits$} {:.digits$}", v[0], v[1], v[2])
             };
-            let Explained {
+            let AlignmentEvidence {
                 explained_features,
                 mesh_features,
                 agreeing_share,

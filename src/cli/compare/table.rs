@@ -5,7 +5,7 @@ use std::path::Path;
 
 use nalgebra::Vector3;
 
-use super::alignment::Alignment;
+use super::alignment::AlignmentReport;
 use crate::cli::{counted, reported};
 use touchup_features::compare::{
     Comparison, Histogram, RegionComparison, Summary, SupportRegion, TiltSummary,
@@ -16,13 +16,13 @@ reported! {
     /// Output of `--json`.
     pub(in crate::cli) struct CompareReport, pub fn of(
         shapes: [(&Path, &TriMesh); 2],
-        aligned: Option<Alignment>,
+        aligned: Option<AlignmentReport>,
         scanned: Option<&Comparison>,
         refined: &Comparison
     ) {
         mesh: ShapeReport = ShapeReport::of(shapes[0].0, shapes[0].1),
         truth: ShapeReport = ShapeReport::of(shapes[1].0, shapes[1].1),
-        alignment?: Alignment = aligned,
+        alignment?: AlignmentReport = aligned,
         /// The scan, with --before.
         before?: ComparisonReport = scanned.map(ComparisonReport::of),
         /// The mesh.
@@ -180,7 +180,7 @@ impl CompareReport {
             )
         };
         let mut lines = vec![size(("mesh", &self.mesh)), size(("truth", &self.truth))];
-        lines.extend(self.alignment.as_ref().and_then(Alignment::details));
+        lines.extend(self.alignment.as_ref().and_then(AlignmentReport::details));
         lines.push(format!(
             "distances in mm; bias +: too much material; {:.2} points/mm2",
             self.after.density_per_mm2

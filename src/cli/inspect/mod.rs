@@ -10,7 +10,7 @@ pub(super) use self::arguments::InspectArguments;
 use super::pictures::view_from;
 use super::progress::WorkProgress;
 use super::{CliError, Losses, print_report};
-use touchup_inspect::{Inspected, InspectionSource, PartDrawing, PartPicture, inspected};
+use touchup_inspect::{Inspection, InspectionSource, PartDrawing, PartPicture, inspected};
 
 /// Runs `touchup inspect`: inspects, and prints the result.
 pub(super) fn inspect(arguments: &InspectArguments) -> Result<Losses, CliError> {
@@ -44,7 +44,7 @@ pub(super) fn inspect(arguments: &InspectArguments) -> Result<Losses, CliError> 
 fn write(
     arguments: &InspectArguments,
     source: &InspectionSource,
-    inspected: &Inspected,
+    inspected: &Inspection,
 ) -> Result<(), CliError> {
     let _writing = WorkProgress::stage("write the report");
     let picture = PartPicture {

@@ -6,7 +6,7 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use super::files::{RECORDING, TOUCHES};
-use super::ready::Ready;
+use super::ready::ProbingSetup;
 use super::report::{ProbedFile, ProbedRecord, kind_of};
 use crate::cli::{CliError, require, write_json};
 use touchup_io::mesh_file::MeshUnit;
@@ -64,7 +64,7 @@ impl ProbingRequest {
         (scan, mesh_unit): (&Path, MeshUnit),
         is_simulated: bool,
         flags: &[Flag],
-        ready: &Ready,
+        ready: &ProbingSetup,
     ) -> Result<Self, CliError> {
         let (scene, scene_crc32) = fingerprint(scene).map_err(not_read(scene))?;
         let (scan, scan_crc32) = fingerprint(scan).map_err(not_read(scan))?;

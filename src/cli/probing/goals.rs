@@ -10,7 +10,7 @@ use crate::cli::{CliError, require};
 use touchup_features::conformity::{
     DecisionParams, FeatureMatch, FeaturePlace, SoughtFeature, ToleranceLimits, match_features,
 };
-use touchup_features::features::{InspectedQuantity, Kind};
+use touchup_features::features::{FeatureKind, InspectedQuantity};
 use touchup_io::nominal_file::{NominalRecord, NominalTolerance, read_nominal};
 use touchup_probing::execute::{Flag, StaticWorld, World};
 use touchup_probing::plan::{DecisionGoal, SoughtCharacteristic};
@@ -45,7 +45,7 @@ pub(in crate::cli) fn goals_of(
     for flag in flags {
         let kind = kind_of(flag);
         require(
-            flag.kind.is_some_and(|kind| kind != Kind::Corner),
+            flag.kind.is_some_and(|kind| kind != FeatureKind::Corner),
             format_args!(
                 "feature {}: nothing of {kind} can be decided: --until decided is for other kinds",
                 flag.id
@@ -90,7 +90,7 @@ fn is_of(record: &NominalRecord, flag: &Flag, world: &StaticWorld) -> bool {
     let normal = world
         .closest_face(&flag.place, NEAR)
         .map(|hit| Vector3::from(world.mesh().normal(hit.face)));
-    let axis = normal.filter(|_| kind != Kind::Edge);
+    let axis = normal.filter(|_| kind != FeatureKind::Edge);
     let place = FeaturePlace {
         id: flag.id,
         kind,

@@ -16,7 +16,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::progress::WorkProgress;
 use super::recorded::RecordedFlags;
-use super::refinement::{Refined, RefinementFiles};
+use super::refinement::{RefinementFiles, RefinementResult};
 use super::signals::StopSignals;
 use super::told::ToldFlags;
 use super::{CliError, Losses, not_written};
@@ -24,16 +24,16 @@ use files::{RECORDING, TOUCHES, probe_topics};
 use folder::{ProbingFolder, ProbingRequest};
 pub(super) use goals::goals_of;
 use picture::{draw_plan, draw_touches};
-pub(super) use ready::{Ready, check_temperature};
+pub(super) use ready::{ProbingSetup, check_temperature};
 pub(super) use report::ProbingSummary;
 use report::{CheckOfResults, ProbedFile, ProbedRecord};
-use touchup_features::features::Kind;
+use touchup_features::features::FeatureKind;
 use touchup_io::atomic::create_folder;
 use touchup_io::mesh_file::{MeshFile, MeshUnit, read_mesh};
 use touchup_io::probed_touches_file::TouchLine;
 use touchup_io::recording::StampSource;
 use touchup_probing::arm::{Arm, ArmState};
-use touchup_probing::execute::{Ending, Flag, Plan, Probed, Prober, References, plan};
+use touchup_probing::execute::{Ending, Flag, FlagResult, Plan, Prober, References, plan};
 use touchup_session::refinement::RefinementOptions;
 use world::LiveWorld;
 pub(super) use world::{KeptMeasurements, SpotWorld};
@@ -53,18 +53,18 @@ pub(super) struct Probing<'a> {
 }
 
 /// Results of a probing.
-pub(super) struct Done {
+pub(super) struct ProbingOutcome {
     pub summary: ProbingSummary,
     /// Features probed in this run.
-    pub probed: Vec<Probed>,
+    pub probed: Vec<FlagResult>,
     /// Unmet requests, or the reason of the end.
     pub outcome: Result<Losses, CliError>,
 }
 
 impl Probing<'_> {
     /// Reads scene and scan.
-    pub fn ready(&self) -> Result<Ready, CliError> {
-        let ready = Ready::read(self.scene, self.scan, self.unit)?;
+    pub fn ready(&self) -> Result<ProbingSetup, CliError> {
+        let ready = ProbingSetup::read(self.scene, self.scan, self.unit)?;
         create_folder(self.out).map_err(not_written(self.out))?;
         Ok(ready)
     }
@@ -72,7 +72,7 @@ impl Probing<'_> {
     /// Plans all touches and draws the plan; nothing moves.
     ///
     /// - `now`: state of the arm.
-    pub fn planned(&self, ready: &Ready, now: &ArmState) -> Result<Vec<Plan>, CliError> {
+    pub fn planned(&self, ready: &ProbingSetup, now: &ArmState) -> Result<Vec<Plan>, CliError> {
         let _planning = WorkProgress::stage("plan");
         let world = ready.static_world()?;
         let plan_of = |flag: &Flag| {
@@ -100,11 +100,11 @@ impl Probing<'_> {
     #[expect(clippy::too_many_lines)]
     pub fn done(
         &self,
-        ready: &Ready,
+        ready: &ProbingSetup,
         arm: &mut dyn Arm,
         is_resumed: bool,
         signals: &StopSignals,
-    ) -> Result<Done, CliError> {
+    ) -> Result<ProbingOutcome, CliError> {
         let folder = ProbingFolder { path: self.out };
         let request = ProbingRequest::new(
             self.scene,
@@ -121,7 +121,7 @@ impl Probing<'_> {
         if !is_resumed {
             folder.begin(&request)?;
         }
-        let (mut probed, mut references) = (Vec::<Probed>::new(), References::default());
+        let (mut probed, mut references) = (Vec::<FlagResult>::new(), References::default());
         let check = CheckOfResults::of(&ready.check);
         for flag in self.flags {
             if features.iter().any(|record| record.flag == flag.id) {
@@ -172,7 +172,7 @@ impl Probing<'_> {
                 told: ready.told.clone(),
                 refine: None,
             };
-            return Ok(Done {
+            return Ok(ProbingOutcome {
                 summary,
                 probed,
                 outcome: Err(error),
@@ -180,7 +180,7 @@ impl Probing<'_> {
         }
         let touched = folder.touches()?;
         let (refine, mut losses, failed) = match self.refined(&touched) {
-            Ok(Refined {
+            Ok(RefinementResult {
                 summary, losses, ..
             }) => (Some(summary), losses, None),
             Err(error) => (None, Losses::new(), Some(error)),
@@ -214,7 +214,7 @@ impl Probing<'_> {
                 &self.out.join("touches.png"),
             )?;
         }
-        Ok(Done {
+        Ok(ProbingOutcome {
             summary: ProbingSummary {
                 check,
                 features,
@@ -229,7 +229,7 @@ impl Probing<'_> {
 
 impl Probing<'_> {
     /// Makes the mesh of the recording in the folder.
-    fn refined(&self, touches: &[TouchLine]) -> Result<Refined, CliError> {
+    fn refined(&self, touches: &[TouchLine]) -> Result<RefinementResult, CliError> {
         let (scene, told) = ToldFlags::default().scene(Some(self.scene))?;
         let recorded = RecordedFlags::from(probe_topics()).named(StampSource::default());
         let files = RefinementFiles::in_folder(self.scan, self.unit, self.out, RECORDING, recorded);
@@ -238,7 +238,10 @@ impl Probing<'_> {
             // why
             force: self.is_forced || touches.iter().all(|touch| touch.centre_mm.is_none()),
             // the scan may lack any probed feature but a plane
-            touches_flaws: self.flags.iter().any(|flag| flag.kind != Some(Kind::Plane)),
+            touches_flaws: self
+                .flags
+                .iter()
+                .any(|flag| flag.kind != Some(FeatureKind::Plane)),
             ..RefinementOptions::default()
         };
         files.refine(scene, told, options)
@@ -272,7 +275,7 @@ pub(super) fn flag_of(id: u32, text: &str, radius: f64) -> Result<Flag, CliError
     const FORM: &str = "KIND@X,Y,Z or KIND@X,Y,Z,RADIUS in mm, with KIND hole, slot, pocket, boss, edge, plane or unknown";
     let wrong = || CliError::usage(format!("--feature {text} is not {FORM}"));
     let (name, numbers) = text.split_once('@').ok_or_else(wrong)?;
-    let kind = Kind::of_name(name);
+    let kind = FeatureKind::of_name(name);
     match metres(numbers).ok_or_else(wrong)?[..] {
         _ if kind.is_none() && name != "unknown" => Err(wrong()),
         [x, y, z] => Ok(Flag {

@@ -9,7 +9,7 @@ use crate::cli::{CliError, counted};
 use touchup_features::compare::{DrawnMesh, PicturePanel, PictureParams, Rgb};
 use touchup_geometry::mesh::TriMesh;
 use touchup_io::probed_touches_file::TouchLine;
-use touchup_probing::execute::{Flag, Plan, PlannedMotion, Probed};
+use touchup_probing::execute::{Flag, FlagResult, Plan, PlannedMotion};
 
 const PART: Rgb = [206, 209, 214];
 const FLAG: Rgb = [20, 20, 20];
@@ -112,7 +112,7 @@ pub(super) fn draw_plan(
 pub(super) fn draw_touches(
     mesh: &TriMesh,
     touches: &[TouchLine],
-    probed: &[Probed],
+    probed: &[FlagResult],
     flags: &[Flag],
     path: &Path,
 ) -> Result<(), CliError> {

@@ -12,7 +12,7 @@ use crate::cli::{CliError, require};
 use touchup_features::calibrate::{ReferenceSphere, beside_spheres};
 use touchup_geometry::mesh::TriMesh;
 use touchup_io::mesh_file::MeshUnit;
-use touchup_probing::execute::{Cell, ProbeParams, StaticWorld};
+use touchup_probing::execute::{ProbeParams, RobotCell, StaticWorld};
 use touchup_session::scan::{Scan, read_scan};
 use touchup_session::scene::{CheckStanding, Scene, simulated_arm};
 use touchup_sim::ArmParams;
@@ -34,9 +34,9 @@ pub(in crate::cli) fn check_temperature(temperature_c: f64) -> Result<(), CliErr
     )
 }
 
-/// Prepared probing.
-pub(in crate::cli) struct Ready {
-    pub cell: Cell,
+/// Cell, parameters, scene and scan of a probing.
+pub(in crate::cli) struct ProbingSetup {
+    pub cell: RobotCell,
     pub params: ProbeParams,
     pub scene: Scene,
     /// Settings of tip and scan, with their sources.
@@ -53,7 +53,7 @@ const NO_ROBOT: &str = "the scene names no `robot`, so the pose of the arm's bas
 
 const NO_MOTION: &str = "the scene does not allow the arm to move: look at plan.png first, then put `allow_motion: true` under `robot`";
 
-impl Ready {
+impl ProbingSetup {
     /// Reads scene and scan; the scene has the tip radius.
     pub fn read(scene: &Path, scan: &Path, unit: MeshUnit) -> Result<Self, CliError> {
         let (scene, told) = ToldFlags::default().scene(Some(scene))?;

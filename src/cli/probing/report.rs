@@ -9,17 +9,19 @@ use crate::cli::refinement::RefineSummary;
 use crate::cli::told::ToldNumbers;
 use crate::cli::{counted, reported};
 use touchup_features::conformity::Decision;
-use touchup_features::features::{InspectedQuantity, Kind};
+use touchup_features::features::{FeatureKind, InspectedQuantity};
 use touchup_io::features_file::FeatureRecord;
 use touchup_probing::arm::SlideRecord;
-use touchup_probing::execute::{Ending, Flag, Probed, ProbedSlide, ProbedTouch, ReferenceTouch};
+use touchup_probing::execute::{
+    Ending, Flag, FlagResult, ProbedSlide, ProbedTouch, ReferenceTouch,
+};
 use touchup_probing::plan::DecidedCharacteristic;
 use touchup_session::scene::{CheckRecord, CheckStanding};
 
 reported! {
     /// Results of one flag, in `probed.json`.
     #[derive(Clone, Deserialize)]
-    pub(in crate::cli) struct ProbedRecord, pub(super) fn of(probed: &Probed, flagged: &Flag) {
+    pub(in crate::cli) struct ProbedRecord, pub(super) fn of(probed: &FlagResult, flagged: &Flag) {
         pub(super) flag: u32 = probed.flag,
         kind: String = kind_of(flagged).to_owned(),
         flagged_mm: [f64; 3] = (flagged.place * 1e3).coords.into(),
@@ -149,7 +151,7 @@ const UNKNOWN: &str = "unknown";
 
 /// Kind of a flag, by its name.
 pub(super) fn kind_of(flag: &Flag) -> &'static str {
-    flag.kind.map_or(UNKNOWN, Kind::name)
+    flag.kind.map_or(UNKNOWN, FeatureKind::name)
 }
 
 impl ProbedRecord {

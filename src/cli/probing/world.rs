@@ -8,7 +8,7 @@ use nalgebra::{Isometry3, Point3};
 
 use super::files::ProbeFiles;
 use super::follower::{Follower, QUEUE, TakeStates};
-use super::ready::Ready;
+use super::ready::ProbingSetup;
 use crate::cli::progress::WorkProgress as Bar;
 use crate::cli::signals::StopSignals;
 use crate::cli::{CliError, not_written, print_result};
@@ -38,7 +38,7 @@ struct FollowingMesh {
 }
 
 impl FollowingMesh {
-    fn new(ready: &Ready, is_simulated: bool) -> Result<Self, CliError> {
+    fn new(ready: &ProbingSetup, is_simulated: bool) -> Result<Self, CliError> {
         let nothing =
             || CliError::usage("the scene says `refine: off`, so nothing would move the mesh");
         let params = ready
@@ -95,13 +95,13 @@ impl FollowingMesh {
 }
 
 /// Files and mesh of a probing: each state of the arm is a sample for both.
-struct Followed {
+struct ProbingRecorder {
     mesh: FollowingMesh,
     files: ProbeFiles,
     failed: Option<CliError>,
 }
 
-impl TakeStates for Followed {
+impl TakeStates for ProbingRecorder {
     fn take_state(&mut self, state: &ArmState) -> bool {
         match self.files.record(state) {
             Ok(messages) => messages
@@ -117,7 +117,7 @@ impl TakeStates for Followed {
 /// Surroundings of an arm that probes features. Files and mesh follow its states beside the loop;
 /// between motions the arm waits for them.
 pub(super) struct LiveWorld<'a> {
-    followed: Follower<Followed>,
+    followed: Follower<ProbingRecorder>,
     signals: &'a StopSignals,
     bar: Bar,
 }
@@ -125,7 +125,7 @@ pub(super) struct LiveWorld<'a> {
 impl<'a> LiveWorld<'a> {
     /// - `is_resumed`: continues the files of the folder and their mesh.
     pub fn new(
-        ready: &Ready,
+        ready: &ProbingSetup,
         out: &Path,
         [is_simulated, is_resumed]: [bool; 2],
         signals: &'a StopSignals,
@@ -137,7 +137,7 @@ impl<'a> LiveWorld<'a> {
             false => ProbeFiles::begin(out, ball_radius)?,
         };
         let followed = Follower::new(
-            Followed {
+            ProbingRecorder {
                 mesh,
                 files,
                 failed: None,
@@ -159,7 +159,7 @@ impl<'a> LiveWorld<'a> {
     /// Ends the recording; returns the number of written touches.
     pub fn finish(self) -> Result<usize, CliError> {
         let is_behind = self.followed.is_behind();
-        let Followed {
+        let ProbingRecorder {
             mesh,
             files,
             failed,
@@ -284,7 +284,7 @@ impl MeasurementLog {
 impl<'a> SpotWorld<'a> {
     /// - `kept`: kind of the measurements, and the file for their immediate output.
     pub fn new(
-        ready: &Ready,
+        ready: &ProbingSetup,
         kept: KeptMeasurements,
         signals: &'a StopSignals,
     ) -> Result<Self, CliError> {

@@ -11,7 +11,7 @@ use touchup::align::{
     align_features,
 };
 use touchup::compare::{sample_surface, surface_area};
-use touchup::features::{Feature, Kind, detect};
+use touchup::features::{Feature, FeatureKind, detect};
 use touchup::io::mesh_file::{MeshUnit, read_mesh, write_mesh};
 use touchup::mesh::{FaceTree, TriMesh, VertexId};
 
@@ -249,7 +249,7 @@ fn a_flange_is_ambiguous_without_the_one_hole_that_breaks_its_symmetry() {
         return;
     };
     let is_dowel = |f: &Feature| {
-        f.kind == Kind::Hole
+        f.kind == FeatureKind::Hole
             && (f.centre.value.x - 0.025).abs() < 1e-3
             && f.centre.value.z.abs() < 1e-3
     };
@@ -385,7 +385,7 @@ fn failed_alignments_say_what_to_do() {
     let planes: Vec<_> = part
         .features
         .iter()
-        .filter(|f| f.kind == Kind::Plane)
+        .filter(|f| f.kind == FeatureKind::Plane)
         .cloned()
         .collect();
     let answer = align_features(&planes, &part.features, None, &params).unwrap_err();
@@ -525,8 +525,8 @@ fn a_flange_with_more_than_its_middle_hole_is_not_free() {
     // its middle hole and the planes square to it alone determine no turn, and the surface says
     // that there is one
     let middle = |f: &Feature| match f.kind {
-        Kind::Hole => f.centre.value.coords.xz().norm() < 1e-3,
-        Kind::Plane => f
+        FeatureKind::Hole => f.centre.value.coords.xz().norm() < 1e-3,
+        FeatureKind::Plane => f
             .axis
             .as_ref()
             .is_some_and(|axis| axis.value.y.abs() > 0.99),
@@ -538,7 +538,7 @@ fn a_flange_with_more_than_its_middle_hole_is_not_free() {
         .filter(|f| middle(f))
         .cloned()
         .collect();
-    assert!(few.iter().any(|f| f.kind == Kind::Hole));
+    assert!(few.iter().any(|f| f.kind == FeatureKind::Hole));
     let answer = align(&part, &few, &part).unwrap_err();
     assert_eq!(
         answer,

@@ -10,7 +10,7 @@ use rand_pcg::Pcg64;
 use touchup::align::{IcpError, IcpFit, IcpParams, icp};
 use touchup::compare::{sample_surface, surface_area};
 use touchup::io::mesh_file::{MeshUnit, read_mesh};
-use touchup::mesh::{Alone, FaceTree, TriMesh};
+use touchup::mesh::{FaceTree, SerialWorkers, TriMesh};
 
 use crate::shapes::revolved;
 
@@ -21,7 +21,7 @@ fn fitted(points: &[Point3<f64>], target: &TriMesh) -> Result<IcpFit, IcpError> 
         &FaceTree::new(target),
         &Isometry3::identity(),
         &IcpParams::default(),
-        &Alone,
+        &SerialWorkers,
     )
 }
 
@@ -198,7 +198,15 @@ fn what_cannot_be_fitted_is_refused_with_numbers() {
         reach: 1e-3,
         ..Default::default()
     };
-    let refused = icp(&far, &plane, &tree, &Isometry3::identity(), &near, &Alone).unwrap_err();
+    let refused = icp(
+        &far,
+        &plane,
+        &tree,
+        &Isometry3::identity(),
+        &near,
+        &SerialWorkers,
+    )
+    .unwrap_err();
     assert_eq!(
         refused,
         IcpError::TooFew {

@@ -16,7 +16,7 @@ use touchup::io::mesh_file::{
     MeshUnit, VertexColumn, read_mesh, read_vertex_columns, write_mesh, write_mesh_with,
 };
 use touchup::io::png::write_png;
-use touchup::mesh::{Alone, FaceTree, Job, TriMesh, Workers};
+use touchup::mesh::{FaceTree, SerialWorkers, Task, TriMesh, Workers};
 use touchup::sim::wavy;
 
 /// A square of 20 mm at a height, in 2 × `cells`² triangles, normals up.
@@ -101,7 +101,14 @@ fn compared(mesh: &TriMesh, truth: &TriMesh, params: &CompareParams) -> Comparis
             tree: &trees[1],
         },
     ];
-    compare(shapes[0], shapes[1], Regions::Unknown, params, &Alone).unwrap()
+    compare(
+        shapes[0],
+        shapes[1],
+        Regions::Unknown,
+        params,
+        &SerialWorkers,
+    )
+    .unwrap()
 }
 
 /// A tetrahedron is so sharp that a place beside an edge or a corner may be behind one of its
@@ -148,7 +155,7 @@ fn beside_sharp_edges_and_corners_outside_is_outside() {
             .map(|corner| (corner * 1.1, corner.coords.norm() * 0.1)),
     );
     let points: Vec<_> = places.iter().map(|(place, _)| *place).collect();
-    for (found, (place, expected)) in deviations(&points, &mesh, &tree, &Alone)
+    for (found, (place, expected)) in deviations(&points, &mesh, &tree, &SerialWorkers)
         .unwrap()
         .iter()
         .zip(&places)
@@ -228,7 +235,7 @@ fn a_ball_of_facets_has_the_distances_of_its_facets() {
     let truth = icosahedron(inner);
     let tree = FaceTree::new(&truth);
     let above_corners = icosahedron(outer);
-    for deviation in deviations(above_corners.positions(), &truth, &tree, &Alone).unwrap() {
+    for deviation in deviations(above_corners.positions(), &truth, &tree, &SerialWorkers).unwrap() {
         assert!((deviation - (outer - inner)).abs() < 1e-16, "{deviation}");
     }
     // the radius of the ball inside an icosahedron over that around it: √((5 + 2√5) / 15)
@@ -237,13 +244,13 @@ fn a_ball_of_facets_has_the_distances_of_its_facets() {
         .faces()
         .map(|(face, _)| Point3::from(truth.barycentre(face).coords.normalize() * outer))
         .collect();
-    for deviation in deviations(&above_facets, &truth, &tree, &Alone).unwrap() {
+    for deviation in deviations(&above_facets, &truth, &tree, &SerialWorkers).unwrap() {
         assert!(
             (deviation - (outer - in_radius)).abs() < 1e-16,
             "{deviation}"
         );
     }
-    let centre = deviations(&[Point3::origin()], &truth, &tree, &Alone).unwrap()[0];
+    let centre = deviations(&[Point3::origin()], &truth, &tree, &SerialWorkers).unwrap()[0];
     assert!((centre + in_radius).abs() < 1e-16, "{centre}");
 }
 
@@ -323,8 +330,15 @@ fn regions_are_separated_and_looked_up_for_the_scan() {
             mesh,
             tree: &trees[at],
         });
-    let own = compare(after, part, Regions::Own(&regions), &few(), &Alone).unwrap();
-    let through = compare(before, part, Regions::Of(after, &regions), &few(), &Alone).unwrap();
+    let own = compare(after, part, Regions::Own(&regions), &few(), &SerialWorkers).unwrap();
+    let through = compare(
+        before,
+        part,
+        Regions::Of(after, &regions),
+        &few(),
+        &SerialWorkers,
+    )
+    .unwrap();
     for found in [&own, &through] {
         let names: Vec<_> = found.regions.iter().map(|part| part.region).collect();
         assert_eq!(
@@ -365,17 +379,17 @@ fn what_is_no_number_or_no_mesh_is_refused() {
     let tree = FaceTree::new(&mesh);
     let bad = [Point3::origin(), Point3::new(0.0, f64::INFINITY, 0.0)];
     assert_eq!(
-        deviations(&bad, &mesh, &tree, &Alone),
+        deviations(&bad, &mesh, &tree, &SerialWorkers),
         Err(CompareError::NotFinite { point: 1 })
     );
     assert_eq!(
-        cloud_distances(&bad, &bad[..1], &Alone),
+        cloud_distances(&bad, &bad[..1], &SerialWorkers),
         Err(CompareError::NotFinite { point: 1 })
     );
     let empty = TriMesh::new(vec![Point3::origin()], vec![]).unwrap();
     let nothing = FaceTree::new(&empty);
     assert_eq!(
-        deviations(&bad[..1], &empty, &nothing, &Alone),
+        deviations(&bad[..1], &empty, &nothing, &SerialWorkers),
         Err(CompareError::NoFaces)
     );
     assert_eq!(tilts(&mesh, &empty, &nothing), Err(CompareError::NoFaces));
@@ -395,7 +409,7 @@ fn what_is_no_number_or_no_mesh_is_refused() {
         (shapes[1], shapes[1]),
     ] {
         assert_eq!(
-            compare(mesh, truth, Regions::Unknown, &few(), &Alone),
+            compare(mesh, truth, Regions::Unknown, &few(), &SerialWorkers),
             Err(CompareError::NoFaces)
         );
     }
@@ -911,7 +925,7 @@ impl Workers for SoMany {
         self.0
     }
 
-    fn run(&self, jobs: Vec<Job<'_>>) {
+    fn run(&self, jobs: Vec<Task<'_>>) {
         std::thread::scope(|threads| jobs.into_iter().for_each(|job| drop(threads.spawn(job))));
     }
 }
@@ -949,7 +963,11 @@ fn any_number_of_threads_finds_the_same_to_the_last_bit() {
         )
     };
     let whole = |workers: &dyn Workers| compare(shape, shape, Regions::Unknown, &few(), workers);
-    let (one, motion, all) = (bits(&Alone), register(&Alone), whole(&Alone));
+    let (one, motion, all) = (
+        bits(&SerialWorkers),
+        register(&SerialWorkers),
+        whole(&SerialWorkers),
+    );
     // one by one, in the order given
     let by_hand = |p| {
         tree.closest(&mesh, p, f64::INFINITY)

@@ -4,7 +4,7 @@ use std::fs;
 
 use nalgebra::{Point3, Vector3};
 use proptest::prelude::*;
-use touchup::features::{Feature, Kind, detect};
+use touchup::features::{Feature, FeatureKind, detect};
 use touchup::io::features_file::{FeatureFile, FeaturesFileError, read_features, write_features};
 use touchup::io::file_error::FileError;
 use touchup::io::result_table::{ResultTable, write_features_as_named, write_touches_as_named};
@@ -286,7 +286,7 @@ fn features() -> Vec<Feature> {
     let mut features = detect(&plate, &[]).features;
     let hole = features
         .iter_mut()
-        .find(|feature| feature.kind == Kind::Hole)
+        .find(|feature| feature.kind == FeatureKind::Hole)
         .unwrap();
     hole.group = Some(7);
     let diameter = hole.diameter.as_mut().unwrap();

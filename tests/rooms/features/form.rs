@@ -4,7 +4,7 @@
 //! `TOUCHUP_FULL=1` runs all seeds; `--nocapture` shows the numbers.
 
 use nalgebra::{Matrix3, Point2, Point3, Vector3};
-use touchup::features::{Feature, Form, Kind, Relation, RelationKind, detect, relations};
+use touchup::features::{Feature, FeatureKind, Form, Relation, RelationKind, detect, relations};
 use touchup::form::Estimate;
 use touchup::mesh::FaceTree;
 use touchup::reconstruct::{CalibrationParams, Patcher, PatcherParams};
@@ -150,7 +150,7 @@ fn found(part: &dyn Surface, seed: u64) -> (Vec<Feature>, bool) {
 fn hole_at(features: &[Feature], axis: [f64; 2]) -> &Feature {
     let is_there = |f: &&Feature| {
         let c = f.centre.value;
-        f.kind == Kind::Hole && (c.x - axis[0]).hypot(c.y - axis[1]) < 1e-3
+        f.kind == FeatureKind::Hole && (c.x - axis[0]).hypot(c.y - axis[1]) < 1e-3
     };
     let all = || {
         features
@@ -219,7 +219,10 @@ fn known_errors_of_form_and_orientation_are_found_within_their_uncertainty() {
             2.0 * LOBE,
         );
         let blind = hole_at(&features, BLIND);
-        let boss = features.iter().find(|f| f.kind == Kind::Boss).unwrap();
+        let boss = features
+            .iter()
+            .find(|f| f.kind == FeatureKind::Boss)
+            .unwrap();
         for feature in [blind, boss] {
             let Some(Form::Round(form)) = &feature.form else {
                 panic!("{feature:?}")
@@ -230,7 +233,7 @@ fn known_errors_of_form_and_orientation_are_found_within_their_uncertainty() {
                 0.0,
             );
         }
-        for plane in features.iter().filter(|f| f.kind == Kind::Plane) {
+        for plane in features.iter().filter(|f| f.kind == FeatureKind::Plane) {
             if let Some(Form::Flat(form)) = &plane.form {
                 ratios.add(
                     &format!(

@@ -7,7 +7,7 @@ use nalgebra::{Point3, Vector3};
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
-use touchup::features::{Feature, FittedTo, Kind, Measured, detect};
+use touchup::features::{Feature, FeatureKind, FittedTo, MeasuredValue, detect};
 use touchup::mesh::{FaceTree, TriMesh};
 use touchup::reconstruct::{CalibrationParams, Patcher, PatcherParams};
 use touchup::sim::{Plate, StylusParams, TruthFeature, TruthShape};
@@ -81,7 +81,7 @@ fn a_smeared_rim_beside_what_was_touched_is_no_shaft() {
         let features = found(*seed, CalibrationOffset::default());
         features
             .iter()
-            .any(|feature| feature.kind == Kind::Cylinder)
+            .any(|feature| feature.kind == FeatureKind::Cylinder)
     };
     let wrong: Vec<u64> = seeds.into_iter().filter(has_shaft).collect();
     assert!(wrong.len() <= most, "{wrong:?}");
@@ -114,7 +114,9 @@ fn features_do_not_depend_on_how_the_mesh_is_numbered() {
         assert!(detect(&other, &touches).features == features);
     }
     assert!(
-        features.iter().any(|feature| feature.kind == Kind::Boss),
+        features
+            .iter()
+            .any(|feature| feature.kind == FeatureKind::Boss),
         "what was touched by then"
     );
 }
@@ -204,11 +206,11 @@ fn across(off: &Vector3<f64>, axis: &Vector3<f64>) -> f64 {
     off.cross(axis).norm()
 }
 
-fn kind_of(truth: &TruthFeature) -> Option<Kind> {
+fn kind_of(truth: &TruthFeature) -> Option<FeatureKind> {
     match truth.shape {
-        TruthShape::Hole { .. } => Some(Kind::Hole),
-        TruthShape::Slot { .. } => Some(Kind::Slot),
-        TruthShape::Boss { .. } => Some(Kind::Boss),
+        TruthShape::Hole { .. } => Some(FeatureKind::Hole),
+        TruthShape::Slot { .. } => Some(FeatureKind::Slot),
+        TruthShape::Boss { .. } => Some(FeatureKind::Boss),
         TruthShape::Step { .. } => None,
     }
 }
@@ -219,7 +221,7 @@ fn compare(table: &mut Table, truth: &TruthFeature, feature: &Feature) {
     let name = truth.name;
     assert_eq!(feature.fitted_to, FittedTo::Touches, "{name}");
     let mut number =
-        |what: &str, truth: f64, measured: &Option<Measured<f64>>, bound: Option<f64>| {
+        |what: &str, truth: f64, measured: &Option<MeasuredValue<f64>>, bound: Option<f64>| {
             let measured = measured
                 .as_ref()
                 .unwrap_or_else(|| panic!("{name} has no {what}"));
@@ -310,7 +312,7 @@ fn compare(table: &mut Table, truth: &TruthFeature, feature: &Feature) {
 }
 
 /// The one feature of a true one's kind near it.
-fn of_truth<'a>(truth: &TruthFeature, kind: Kind, features: &'a [Feature]) -> &'a Feature {
+fn of_truth<'a>(truth: &TruthFeature, kind: FeatureKind, features: &'a [Feature]) -> &'a Feature {
     let near =
         |feature: &&Feature| across(&(feature.centre.value - truth.centre), &truth.axis) < 1.5e-3;
     let mut found = features
@@ -347,13 +349,19 @@ fn touched_features_are_found_within_their_stated_uncertainty() {
                 stiffness: sign(1) * 0.02,
             },
         );
-        let count = |kind: Kind| {
+        let count = |kind: FeatureKind| {
             features
                 .iter()
                 .filter(|feature| feature.kind == kind)
                 .count()
         };
-        let counts = [Kind::Hole, Kind::Slot, Kind::Pocket, Kind::Boss].map(count);
+        let counts = [
+            FeatureKind::Hole,
+            FeatureKind::Slot,
+            FeatureKind::Pocket,
+            FeatureKind::Boss,
+        ]
+        .map(count);
         if counts != [2, 1, 0, 1] {
             let all = features
                 .iter()
@@ -436,7 +444,7 @@ fn a_wrong_radius_goes_twice_into_every_width_and_is_not_in_its_uncertainty() {
     {
         let width = |features: &[Feature]| {
             let feature = of_truth(truth, kind, features);
-            let width = if kind == Kind::Slot {
+            let width = if kind == FeatureKind::Slot {
                 &feature.width
             } else {
                 &feature.diameter
@@ -450,7 +458,7 @@ fn a_wrong_radius_goes_twice_into_every_width_and_is_not_in_its_uncertainty() {
             TruthShape::Step { .. } => unreachable!("a step is an edge"),
         };
         let (before, after) = (width(&right), width(&wrong));
-        let expected = if kind == Kind::Boss {
+        let expected = if kind == FeatureKind::Boss {
             -2.0 * off
         } else {
             2.0 * off
@@ -542,7 +550,7 @@ fn what_was_not_felt_is_a_bound_or_has_no_uncertainty() {
     }
     let of = |touches: &[ProbedPoint]| detect(&mesh, touches).features;
     let depth = |features: &[Feature]| {
-        of_truth(&truth, Kind::Hole, features)
+        of_truth(&truth, FeatureKind::Hole, features)
             .depth
             .clone()
             .unwrap()

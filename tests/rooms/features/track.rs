@@ -1,7 +1,7 @@
 //! Features followed between two looks at the mesh: numbers stay, and new touches count at once.
 
 use crate::plate_stream::{contacts_of, plate_stream};
-use touchup::features::{Feature, FittedTo, Kind, Tracker};
+use touchup::features::{Feature, FeatureKind, FittedTo, Tracker};
 use touchup::mesh::{FaceTree, TriMesh};
 use touchup::reconstruct::{Patcher, PatcherParams};
 use touchup::sim::StylusParams;
@@ -23,7 +23,7 @@ fn touched_plate(seed: u64) -> (TriMesh, Vec<ProbedPoint>) {
     (patched.mesh, patcher.probed().to_vec())
 }
 
-fn sizes(features: &[Feature]) -> Vec<(u32, Kind, f64)> {
+fn sizes(features: &[Feature]) -> Vec<(u32, FeatureKind, f64)> {
     let size = |f: &Feature| {
         f.diameter
             .as_ref()

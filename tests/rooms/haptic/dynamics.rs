@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 use nalgebra::{Point3, Rotation3, Vector3};
 use proptest::prelude::*;
 use touchup::haptic::{
-    Along, ContactModel, DynamicsError, DynamicsParams, FaceDynamics, FaceState, StepRule,
+    ContactModel, DynamicsError, DynamicsParams, FaceDynamics, FaceState, MotionDirection, StepRule,
 };
 use touchup::sim::coupled::GuidedStylus;
 
@@ -29,7 +29,7 @@ fn paper(alpha: f64, beta: f64) -> DynamicsParams {
         model: SIGMOID,
         alpha_m_per_n_s: alpha,
         beta_per_n2_s: beta,
-        along: Along::InitialNormal,
+        along: MotionDirection::InitialNormal,
         take_out_rigid_offset: false,
         ..DynamicsParams::default()
     }
@@ -284,7 +284,7 @@ fn the_explicit_solver_gives_up_on_stiff_steps() {
 
 /// Distance in units of h_min plus angle after 40 ms in `steps` steps, against the tight explicit
 /// solver.
-fn error_after(rule: StepRule, along: Along, offset: bool, steps: u32) -> f64 {
+fn error_after(rule: StepRule, along: MotionDirection, offset: bool, steps: u32) -> f64 {
     let params = DynamicsParams {
         rule,
         along,
@@ -332,7 +332,8 @@ fn error_after(rule: StepRule, along: Along, offset: bool, steps: u32) -> f64 {
 fn lie_is_first_order_and_corrected_second() {
     for offset in [false, true] {
         for (rule, order) in [(StepRule::Lie, 1.0), (StepRule::DriftCorrected, 2.0)] {
-            let errors = [64, 128, 256].map(|steps| error_after(rule, Along::Force, offset, steps));
+            let errors = [64, 128, 256]
+                .map(|steps| error_after(rule, MotionDirection::Force, offset, steps));
             println!("{rule:?}, offset taken out: {offset}: {errors:?}");
             assert_near((errors[0] / errors[1]).log2(), order, 0.15);
             assert_near((errors[1] / errors[2]).log2(), order, 0.15);
@@ -350,7 +351,7 @@ fn the_corrected_step_stays_accurate_when_stiff() {
     let params = |rule| DynamicsParams {
         model,
         rule,
-        along: Along::Force,
+        along: MotionDirection::Force,
         ..paper(0.1, 0.1)
     };
     let (p, force) = (
@@ -381,7 +382,10 @@ fn unit() -> impl Strategy<Value = Vector3<f64>> {
 
 fn params() -> impl Strategy<Value = DynamicsParams> {
     let rule = prop_oneof![Just(StepRule::Lie), Just(StepRule::DriftCorrected)];
-    let along = prop_oneof![Just(Along::InitialNormal), Just(Along::Force)];
+    let along = prop_oneof![
+        Just(MotionDirection::InitialNormal),
+        Just(MotionDirection::Force)
+    ];
     let model = prop_oneof![
         Just(SIGMOID),
         Just(ContactModel::Spring {
@@ -678,9 +682,9 @@ fn check_sum(u: f64, c: f64, t: f64, first: f64, tilted: bool) -> Shown {
         delta: 0.0,
     };
     let along = if tilted {
-        Along::Force
+        MotionDirection::Force
     } else {
-        Along::InitialNormal
+        MotionDirection::InitialNormal
     };
     let params = DynamicsParams {
         model,
@@ -788,7 +792,7 @@ fn one_face_comes_to_the_true_plane_distance_first_then_normal() {
         ([0.5, 0.5, 4.0], 15.0, 4.0),
     ];
     for (b, tilt, azimuth) in starts {
-        for along in [Along::InitialNormal, Along::Force] {
+        for along in [MotionDirection::InitialNormal, MotionDirection::Force] {
             let errors = one_face(
                 DynamicsParams {
                     along,
@@ -826,9 +830,9 @@ fn one_face_comes_to_the_true_plane_distance_first_then_normal() {
 #[test]
 fn moving_along_the_normal_runs_away_from_100_degrees_and_along_the_force_it_does_not() {
     for (along, tilts, bounded) in [
-        (Along::InitialNormal, [60.0, 80.0], true),
-        (Along::InitialNormal, [100.0, 120.0], false),
-        (Along::Force, [80.0, 120.0], true),
+        (MotionDirection::InitialNormal, [60.0, 80.0], true),
+        (MotionDirection::InitialNormal, [100.0, 120.0], false),
+        (MotionDirection::Force, [80.0, 120.0], true),
     ] {
         for tilt in tilts {
             let params = DynamicsParams {

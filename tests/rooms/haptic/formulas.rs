@@ -7,8 +7,8 @@ use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 use touchup::haptic::dynamics::turn;
 use touchup::haptic::{
-    Along, ContactModel, DynamicsParams, FaceDynamics, FaceState, RefineParams, Refiner, StepRule,
-    TipParams,
+    ContactModel, DynamicsParams, FaceDynamics, FaceState, MotionDirection, RefineParams, Refiner,
+    StepRule, TipParams,
 };
 use touchup::mesh::{TriMesh, VertexId};
 use touchup::stylus::{Sample, Wrench};
@@ -52,7 +52,7 @@ fn dynamics(model: ContactModel, alpha: f64, beta: f64) -> FaceDynamics {
         alpha_m_per_n_s: alpha,
         beta_per_n2_s: beta,
         rule: StepRule::Lie,
-        along: Along::InitialNormal,
+        along: MotionDirection::InitialNormal,
         take_out_rigid_offset: false,
     };
     FaceDynamics::new(params).unwrap()

@@ -4,7 +4,7 @@ use nalgebra::{Point3, Vector3};
 use proptest::prelude::*;
 use touchup::io::mesh_file::{MeshFile, MeshFileError, MeshUnit, VertexColumn};
 use touchup::io::mesh_file::{read_appearance, read_mesh, write_mesh, write_mesh_with};
-use touchup::mesh::{Alone, FaceId, Texture, TriMesh, VertexColours, VertexId, repair};
+use touchup::mesh::{FaceId, SerialWorkers, Texture, TriMesh, VertexColours, VertexId, repair};
 
 use crate::allocations::largest_request;
 use crate::shared::shared;
@@ -388,12 +388,12 @@ fn colours_and_textures_come_back_from_either_kind_of_file() {
             .expect("it says how it looks");
         let mesh = read_mesh(&at(name), Metre).unwrap().mesh;
         assert_eq!(
-            appearance.colours_at(mesh.positions(), &Alone),
+            appearance.colours_at(mesh.positions(), &SerialWorkers),
             Some(VertexColours::Rgb(colours.clone())),
             "{name}"
         );
         assert_eq!(
-            appearance.texture_on(&mesh, mesh.positions(), &Alone),
+            appearance.texture_on(&mesh, mesh.positions(), &SerialWorkers),
             Some(texture.clone()),
             "{name}"
         );
@@ -428,7 +428,7 @@ fn colours_are_bytes_or_shares_and_all_vertices_have_one_or_none() {
         let mesh = read_mesh(&path, Metre).unwrap().mesh;
         read_appearance(&path, Metre)
             .unwrap()
-            .and_then(|look| look.colours_at(mesh.positions(), &Alone))
+            .and_then(|look| look.colours_at(mesh.positions(), &SerialWorkers))
     };
     let head = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n";
     let tail = "element face 1\nproperty list uchar int vertex_indices\nend_header\n";

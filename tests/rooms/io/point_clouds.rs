@@ -9,7 +9,7 @@ use rand_distr::{Distribution, Normal, UnitSphere};
 use rand_pcg::Pcg64;
 use tempfile::TempDir;
 use touchup::io::mesh_file::{MeshOrPoints, MeshUnit, read_mesh_or_points};
-use touchup::mesh::{Alone, Job, PointCloud, ScanStation, TriMesh, Workers, repair};
+use touchup::mesh::{PointCloud, ScanStation, SerialWorkers, Task, TriMesh, Workers, repair};
 use touchup::reconstruct::{CloudSummary, CloudSurface, NormalSource, surface_of_cloud};
 use touchup::scan::{Scan, read_scan};
 
@@ -95,7 +95,7 @@ impl Workers for InParts {
         self.0
     }
 
-    fn run(&self, jobs: Vec<Job<'_>>) {
+    fn run(&self, jobs: Vec<Task<'_>>) {
         jobs.into_iter().rev().for_each(|job| job());
     }
 }
@@ -117,7 +117,7 @@ fn the_surface_of_a_closed_part_is_closed_however_the_points_fall() {
         summary,
     } = surface_of_cloud(cloud(), &InParts(3)).unwrap();
     assert_eq!(summary.cut_faces, 0, "{summary}");
-    let alone = surface_of_cloud(cloud(), &Alone).unwrap();
+    let alone = surface_of_cloud(cloud(), &SerialWorkers).unwrap();
     let bits = |positions: &[Point3<f64>]| {
         positions
             .iter()

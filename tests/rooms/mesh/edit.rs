@@ -6,7 +6,9 @@ use nalgebra::{Point3, Vector3, vector};
 use proptest::prelude::*;
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
-use touchup::mesh::{BoxQuery, FaceId, FaceTree, Nearby, RefitPlan, TriMesh, VertexId, triangle};
+use touchup::mesh::{
+    BoxQuery, FaceId, FaceTree, NearbyLeaves, RefitPlan, TriMesh, VertexId, triangle,
+};
 
 use crate::common::{grid, within};
 
@@ -190,7 +192,7 @@ fn check_queries(
     mesh: &TriMesh,
     tree: &FaceTree,
     p: &Point3<f64>,
-    nearby: &mut Nearby,
+    nearby: &mut NearbyLeaves,
     rng: &mut Pcg64,
 ) {
     let near = distances(mesh, p);
@@ -320,7 +322,7 @@ struct Edited {
     plan: RefitPlan,
     /// the vertex of the plan and the number of its faces then
     planned: Option<(VertexId, Vec<FaceId>)>,
-    nearby: Nearby,
+    nearby: NearbyLeaves,
 }
 
 impl Edited {
@@ -328,7 +330,7 @@ impl Edited {
         let edge = 2.0 * scale / f64::from(cells);
         let mesh = grid(cells, edge, |_, _| within(rng, -0.2 * scale, 0.2 * scale));
         let (tree, ledger) = (FaceTree::new(&mesh), Ledger::of(&mesh));
-        let (plan, nearby) = (RefitPlan::default(), Nearby::default());
+        let (plan, nearby) = (RefitPlan::default(), NearbyLeaves::default());
         Self {
             mesh,
             tree,
@@ -544,7 +546,7 @@ fn a_walk_over_a_mesh_that_moves_finds_what_a_search_from_the_root_finds() {
         let push = EDGE * 10f64.powf(within(&mut rng, -4.0, -0.5));
         let margin = EDGE * [0.0, 0.05, 0.3][seed as usize % 3];
         let mut mesh = grid(40, EDGE, |_, _| within(&mut rng, -0.2 * EDGE, 0.2 * EDGE));
-        let (mut tree, mut nearby) = (FaceTree::new(&mesh), Nearby::default());
+        let (mut tree, mut nearby) = (FaceTree::new(&mesh), NearbyLeaves::default());
         let (mut below, mut beside) = (Pushed::default(), Pushed::default());
         let (mut p, mut last) = (Point3::new(0.0, 0.0, 0.1 * EDGE), FaceId(0));
         for step in 0..600 {

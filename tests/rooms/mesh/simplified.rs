@@ -1,7 +1,7 @@
 //! Simplified meshes against closed forms, and how motion is carried over to the original.
 
 use nalgebra::{Point3, Rotation3, UnitQuaternion, Vector3, vector};
-use touchup::mesh::{Simplified, TriMesh, VertexId};
+use touchup::mesh::{SimplifiedMesh, TriMesh, VertexId};
 
 use crate::common::grid;
 use crate::shapes::{icosphere, torus};
@@ -31,7 +31,7 @@ fn a_closed_mesh_stays_closed_and_keeps_its_handles() {
         (icosphere(10.0, 6), 2, 2.5),
         (torus(10.0, 3.0, [400, 130]), 0, 1.2),
     ] {
-        let simplified = Simplified::new(&mesh, edge).unwrap().mesh;
+        let simplified = SimplifiedMesh::new(&mesh, edge).unwrap().mesh;
         let soundness = soundness(&simplified);
         assert_eq!((soundness.rims.len(), euler(&simplified)), (0, expected));
         let faces = simplified.face_count();
@@ -46,7 +46,9 @@ fn a_closed_mesh_stays_closed_and_keeps_its_handles() {
 #[test]
 fn edges_are_about_as_long_as_asked_for_and_vertices_lie_on_the_surface() {
     let (radius, edge) = (10.0, 1.0);
-    let simplified = Simplified::new(&icosphere(radius, 6), edge).unwrap().mesh;
+    let simplified = SimplifiedMesh::new(&icosphere(radius, 6), edge)
+        .unwrap()
+        .mesh;
     let mut lengths = Vec::new();
     for (_, [a, b, c]) in simplified.faces() {
         lengths.extend(
@@ -71,7 +73,7 @@ fn edges_are_about_as_long_as_asked_for_and_vertices_lie_on_the_surface() {
 fn an_edge_of_the_part_stays_sharp() {
     // a roof with a ridge along y, 45 degrees to both sides
     let roof = grid(120, 0.1, |x, _| -x.abs());
-    let simplified = Simplified::new(&roof, 0.8).unwrap().mesh;
+    let simplified = SimplifiedMesh::new(&roof, 0.8).unwrap().mesh;
     let inside = |p: &&Point3<f64>| p.x.abs() < 5.0 && p.y.abs() < 5.0;
     for p in simplified.positions().iter().filter(inside) {
         let off = (p.z + p.x.abs()).abs() / 2f64.sqrt();
@@ -101,7 +103,7 @@ fn the_two_sides_of_a_thin_sheet_stay_apart() {
         side.faces()
             .map(|(_, [a, b, c])| [a, c, b].map(|v| v.0 + count)),
     );
-    let simplified = Simplified::new(&TriMesh::new(positions, faces).unwrap(), 0.8)
+    let simplified = SimplifiedMesh::new(&TriMesh::new(positions, faces).unwrap(), 0.8)
         .unwrap()
         .mesh;
     for (face, corners) in simplified.faces() {
@@ -120,7 +122,7 @@ fn the_two_sides_of_a_thin_sheet_stay_apart() {
 
 #[test]
 fn the_rim_of_an_open_mesh_stays_where_it_is() {
-    let simplified = Simplified::new(&grid(100, 0.1, |_, _| 0.0), 0.8)
+    let simplified = SimplifiedMesh::new(&grid(100, 0.1, |_, _| 0.0), 0.8)
         .unwrap()
         .mesh;
     let [lo, hi] = simplified.bounds();
@@ -141,7 +143,7 @@ fn the_rim_of_an_open_mesh_stays_where_it_is() {
 fn fine_detail_rides_along_and_what_does_not_move_stays_bit_by_bit() {
     let texture = |x: f64, y: f64| 0.03 * (9.0 * x).sin() * (7.0 * y).cos();
     let scan = grid(120, 0.1, texture);
-    let simplified = Simplified::new(&scan, 0.8).unwrap();
+    let simplified = SimplifiedMesh::new(&scan, 0.8).unwrap();
     assert!(simplified.carry(&scan, &simplified.mesh).positions() == scan.positions());
 
     let shift = vector![0.3, -0.2, 0.5];
@@ -152,7 +154,7 @@ fn fine_detail_rides_along_and_what_does_not_move_stays_bit_by_bit() {
 
     // tilted about an axis in the plane, no vertex where it was: every one turns with its normal
     let turn = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), 0.4);
-    let flat = Simplified::new(&grid(120, 0.1, |_, _| 0.0), 0.8).unwrap();
+    let flat = SimplifiedMesh::new(&grid(120, 0.1, |_, _| 0.0), 0.8).unwrap();
     let turned = flat.carry(&scan, &moved(&flat.mesh, |p| turn * p + shift));
     let expected = Rotation3::from_axis_angle(&Vector3::x_axis(), 0.4);
     for (p, q) in scan.positions().iter().zip(turned.positions()) {

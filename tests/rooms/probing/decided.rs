@@ -12,11 +12,12 @@ use touchup::conformity::{
     Decision, DecisionParams, MeasuredNumber, ToleranceLimits, assess, measured_number,
 };
 use touchup::features::fit::{
-    Cylinder, Ends, FitParams, Freedom, Observation, Plane, Stadium, Surface, fit,
+    Cylinder, Ends, FitParams, Freedom, Observation, Plane, Stadium, SurfaceModel, fit,
 };
-use touchup::features::{InspectedQuantity, Kind};
+use touchup::features::{FeatureKind, InspectedQuantity};
 use touchup::probing::plan::{
-    ArmUncertainty, DecisionGoal, Explorer, Found, PatternParams, Quantity, SoughtCharacteristic,
+    ArmUncertainty, DecisionGoal, ExplorationResult, Explorer, FeatureQuantity, PatternParams,
+    SoughtCharacteristic,
 };
 use touchup::sim::{Plate, Surface as _};
 
@@ -31,45 +32,45 @@ const RADIUS: f64 = 1e-6;
 #[derive(Clone, Copy)]
 struct Case {
     name: &'static str,
-    kind: Kind,
+    kind: FeatureKind,
     flag: Point3<f64>,
     quantity: InspectedQuantity,
-    asked: Quantity,
+    asked: FeatureQuantity,
     value: f64,
     half: f64,
 }
 
 const HOLE: Case = Case {
     name: "diameter of a hole",
-    kind: Kind::Hole,
+    kind: FeatureKind::Hole,
     flag: Point3::new(16e-3, 36e-3, TOP),
     quantity: InspectedQuantity::Diameter,
-    asked: Quantity::Diameter,
+    asked: FeatureQuantity::Diameter,
     value: 8e-3,
     half: 0.3e-3,
 };
 const BOSS: Case = Case {
     name: "diameter of a boss",
-    kind: Kind::Boss,
+    kind: FeatureKind::Boss,
     flag: Point3::new(47e-3, 25e-3, 16e-3),
     value: 10e-3,
     ..HOLE
 };
 const SLOT: Case = Case {
     name: "width of a slot",
-    kind: Kind::Slot,
+    kind: FeatureKind::Slot,
     flag: Point3::new(25e-3, 14e-3, TOP),
     quantity: InspectedQuantity::Width,
-    asked: Quantity::Width,
+    asked: FeatureQuantity::Width,
     value: 6e-3,
     ..HOLE
 };
 const PLANE: Case = Case {
     name: "height of a plane",
-    kind: Kind::Plane,
+    kind: FeatureKind::Plane,
     flag: Point3::new(45e-3, 9e-3, TOP),
     quantity: InspectedQuantity::Z,
-    asked: Quantity::Position,
+    asked: FeatureQuantity::Position,
     value: TOP,
     half: 0.15e-3,
 };
@@ -104,7 +105,7 @@ fn explored(
     goal: Option<DecisionGoal>,
     rng: &mut Pcg64,
     look: &mut dyn FnMut(&Explorer),
-) -> Found {
+) -> ExplorationResult {
     let plate = Plate::default();
     let mut some = |most: f64| rng.random_range(-most..most);
     let flag = case.flag + Vector3::new(some(1e-3), some(1e-3), 0.0);
@@ -141,7 +142,7 @@ fn goal(case: &Case, limits: ToleranceLimits, confidence: f64) -> DecisionGoal {
     }
 }
 
-fn until_decided(case: &Case, share: f64, budget: usize, seed: u64) -> Found {
+fn until_decided(case: &Case, share: f64, budget: usize, seed: u64) -> ExplorationResult {
     let mut rng = Pcg64::seed_from_u64(seed);
     explored(
         case,
@@ -221,7 +222,7 @@ fn touched_evenly(case: &Case, seed: u64) -> MeasuredNumber {
         is_at_least: false,
     };
     match case.kind {
-        Kind::Plane => {
+        FeatureKind::Plane => {
             let plane = Plane::new(case.flag, &Vector3::z());
             let observations: Vec<_> = (0..GRID)
                 .map(|at| {
@@ -242,7 +243,7 @@ fn touched_evenly(case: &Case, seed: u64) -> MeasuredNumber {
                 is_at_least: false,
             }
         }
-        Kind::Slot => {
+        FeatureKind::Slot => {
             let sizes = [6e-3, 20e-3];
             let truth = Stadium::new(
                 case.flag,
@@ -260,7 +261,7 @@ fn touched_evenly(case: &Case, seed: u64) -> MeasuredNumber {
             of_size(fitted.surface.width, fitted.std_by(&[(Freedom::Size, 1.0)]))
         }
         _ => {
-            let is_hole = case.kind == Kind::Hole;
+            let is_hole = case.kind == FeatureKind::Hole;
             let middle = Point3::new(
                 case.flag.x,
                 case.flag.y,
@@ -281,7 +282,7 @@ fn touched_evenly(case: &Case, seed: u64) -> MeasuredNumber {
     }
 }
 
-fn evenly_on<M: Surface>(
+fn evenly_on<M: SurfaceModel>(
     truth: &M,
     observe: &mut dyn FnMut(Point3<f64>, Vector3<f64>, usize) -> Observation,
     place: impl Fn(usize) -> Point3<f64>,

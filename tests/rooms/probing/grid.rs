@@ -7,10 +7,10 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
 use touchup::features::fit::{
-    Cylinder, Ends, FitParams, Freedom, Observation, Plane, Stadium, Surface, fit,
+    Cylinder, Ends, FitParams, Freedom, Observation, Plane, Stadium, SurfaceModel, fit,
 };
-use touchup::features::{Feature, Kind};
-use touchup::probing::plan::{Explorer, PatternParams, Quantity};
+use touchup::features::{Feature, FeatureKind};
+use touchup::probing::plan::{Explorer, FeatureQuantity, PatternParams};
 use touchup::sim::{Plate, Surface as _};
 
 use super::plan::{SIGMA, TOP, normal_of, on, probe};
@@ -54,7 +54,7 @@ fn outline(half: f64, radius: f64, share: f64) -> (Point3<f64>, Vector3<f64>) {
 /// A hole or slot of the plate.
 #[derive(Clone, Copy)]
 struct Opening {
-    kind: Kind,
+    kind: FeatureKind,
     middle: Point3<f64>,
     half: f64,
     radius: f64,
@@ -62,14 +62,14 @@ struct Opening {
 }
 
 const HOLE: Opening = Opening {
-    kind: Kind::Hole,
+    kind: FeatureKind::Hole,
     middle: Point3::new(16e-3, 36e-3, TOP),
     half: 0.0,
     radius: 4e-3,
     deep: IN_HOLE,
 };
 const SLOT: Opening = Opening {
-    kind: Kind::Slot,
+    kind: FeatureKind::Slot,
     middle: Point3::new(25e-3, 14e-3, TOP),
     half: 7e-3,
     radius: 3e-3,
@@ -148,7 +148,7 @@ impl Opening {
         let met = |center: Point3<f64>, axis: Vector3<f64>| {
             center - axis * (top.distance(&center) / top.normal().dot(&axis))
         };
-        if self.kind == Kind::Hole {
+        if self.kind == FeatureKind::Hole {
             let truth = Cylinder::new(self.middle, axis, self.radius, true);
             let on_wall = |p: &Point3<f64>| (on(&truth, p), normal_of(&truth, &on(&truth, p)));
             let walls: Vec<_> = walls.iter().map(|p| touch(&on_wall, p, rng)).collect();
@@ -198,7 +198,7 @@ impl Opening {
     /// Errors of planned touches from a flag up to 2 mm beside it, and how many there were.
     fn planned_errors(
         &self,
-        quantity: Quantity,
+        quantity: FeatureQuantity,
         axis: &Vector3<f64>,
         rng: &mut Pcg64,
     ) -> (Errors, usize) {
@@ -307,12 +307,12 @@ fn planned_touches_are_better_than_a_grid_over_the_region() {
     let seeds = 200;
     let mut failures = Vec::new();
     for (name, opening) in [("hole", HOLE), ("slot", SLOT)] {
-        let names = if opening.kind == Kind::Hole {
+        let names = if opening.kind == FeatureKind::Hole {
             ["place", "diameter", "", "lean over 4 mm"]
         } else {
             ["place", "width", "length", "lean over 4 mm"]
         };
-        for quantity in [Quantity::Position, Quantity::All] {
+        for quantity in [FeatureQuantity::Position, FeatureQuantity::All] {
             let (mut planned, mut grid) = (Vec::new(), Vec::new());
             for seed in 0..seeds {
                 let mut rng = Pcg64::seed_from_u64(seed);
@@ -341,7 +341,7 @@ fn planned_touches_are_better_than_a_grid_over_the_region() {
                 println!("{line}");
                 let most = if at == 0 { 2.0 / 3.0 } else { 1.0 };
                 // the others are not asked for with the place
-                if ratio > most && (at == 0 || quantity == Quantity::All) {
+                if ratio > most && (at == 0 || quantity == FeatureQuantity::All) {
                     failures.push(line);
                 }
             }

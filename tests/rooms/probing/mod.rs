@@ -6,6 +6,3 @@ mod execute;
 mod grid;
 mod plan;
 mod pockets;
-
-#[cfg(feature = "ros")]
-pub use execute::StaticScan;

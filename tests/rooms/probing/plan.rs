@@ -8,13 +8,14 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 use touchup::features::fit::{
-    Cylinder, Ends, FREEDOMS, FitParams, Freedom, Observation, Plane, Stadium, Steps, Surface, fit,
+    Cylinder, Ends, FREEDOMS, FitParams, Freedom, Observation, Plane, Stadium, Steps, SurfaceModel,
+    fit,
 };
-use touchup::features::{Kind, Measured};
+use touchup::features::{FeatureKind, MeasuredValue};
 use touchup::mesh::TriMesh;
 use touchup::probing::plan::{
-    Asked, Candidate, ExploreError, Explorer, Found, Knowledge, PatternParams, TouchPlan,
-    TouchResult,
+    Candidate, ExplorationResult, ExploreError, Explorer, Knowledge, PatternParams,
+    TargetUncertainties, TouchPlan, TouchResult,
 };
 use touchup::sim::{Plate, Surface as _};
 
@@ -48,11 +49,11 @@ fn wall() -> Vec<Candidate> {
 
 /// Up to `count` touches, each as if those before had been made, until all is known as it is asked
 /// for.
-fn plan<M: Surface>(
+fn plan<M: SurfaceModel>(
     mut known: Knowledge,
     surface: &M,
     candidates: &[Candidate],
-    asked: &Asked,
+    asked: &TargetUncertainties,
     count: usize,
 ) -> (Vec<usize>, Knowledge) {
     let mut chosen = Vec::new();
@@ -69,7 +70,7 @@ fn plan<M: Surface>(
 
 /// Standard deviation of a number that changes with a freedom.
 fn sigma_of(known: &Knowledge, by: (Freedom, f64)) -> f64 {
-    known.worst(&Asked::default().and(&[by], 1.0))
+    known.worst(&TargetUncertainties::default().and(&[by], 1.0))
 }
 
 fn observation(candidate: &Candidate, group: u32) -> Observation {
@@ -123,7 +124,7 @@ fn the_tilt_of_a_plane_is_asked_at_its_corners() {
             sigma: SIGMA,
         })
         .collect();
-    let asked = Asked::default()
+    let asked = TargetUncertainties::default()
         .and(&[(Freedom::TiltX, 1.0)], 1e-9)
         .and(&[(Freedom::TiltY, 1.0)], 1e-9);
     let (chosen, _) = plan(
@@ -147,7 +148,7 @@ fn touches_are_as_many_as_the_goal_asks_for() {
     let (surface, wall) = (hole(), wall());
     let mut counts = Vec::new();
     for wanted in [20e-6, 5e-6, 2.5e-6] {
-        let asked = Asked::default().and(&[(Freedom::Size, 2.0)], wanted);
+        let asked = TargetUncertainties::default().and(&[(Freedom::Size, 2.0)], wanted);
         // those that found it
         let first: Vec<usize> = (0..120).step_by(17).collect();
         let known = first
@@ -216,7 +217,7 @@ struct Case<M> {
 const LEAN: f64 = 0.02;
 
 /// Outward normal at a point, by differences of the distance.
-pub(super) fn normal_of<M: Surface>(surface: &M, p: &Point3<f64>) -> Vector3<f64> {
+pub(super) fn normal_of<M: SurfaceModel>(surface: &M, p: &Point3<f64>) -> Vector3<f64> {
     let step = 1e-6;
     let by = |direction: Vector3<f64>| {
         surface.distance(&(p + direction * step)) - surface.distance(&(p - direction * step))
@@ -225,13 +226,13 @@ pub(super) fn normal_of<M: Surface>(surface: &M, p: &Point3<f64>) -> Vector3<f64
 }
 
 /// The place of a surface that is nearest to a point near it.
-pub(super) fn on<M: Surface>(surface: &M, p: &Point3<f64>) -> Point3<f64> {
+pub(super) fn on<M: SurfaceModel>(surface: &M, p: &Point3<f64>) -> Point3<f64> {
     (0..4).fold(*p, |p, _| p - normal_of(surface, &p) * surface.distance(&p))
 }
 
 /// Deviation of the numbers together, by the inverse of the information of all touches at once,
 /// with derivatives from differences of the distance of surfaces that are moved.
-fn sigma_by_differences<M: Surface>(
+fn sigma_by_differences<M: SurfaceModel>(
     truth: &M,
     touches: &[Point3<f64>],
     asked: &[(Freedom, f64, f64)],
@@ -273,7 +274,7 @@ fn sigma_by_differences<M: Surface>(
 /// Both are those of the information matrix of the touches, and the best of 300 patterns of random
 /// places is no better than the plan.
 #[expect(clippy::too_many_lines)]
-fn planned_over_grid<M: Surface>(case: &Case<M>) -> f64 {
+fn planned_over_grid<M: SurfaceModel>(case: &Case<M>) -> f64 {
     let count = case.grid.len();
     let (mut squares, mut variances, mut random) = ([0.0; 2], [0.0; 2], 0.0);
     let (surfaces, draws) = (20, 10);
@@ -300,12 +301,10 @@ fn planned_over_grid<M: Surface>(case: &Case<M>) -> f64 {
         let known = first
             .iter()
             .fold(before, |known, touch| known.with(&guess, touch));
-        let asked = case
-            .asked
-            .iter()
-            .fold(Asked::default(), |asked, (freedom, by, sigma)| {
-                asked.and(&[(*freedom, *by)], *sigma)
-            });
+        let asked = case.asked.iter().fold(
+            TargetUncertainties::default(),
+            |asked, (freedom, by, sigma)| asked.and(&[(*freedom, *by)], *sigma),
+        );
         let asked = asked.and_the_rest::<M>(1e-6, 3e-3);
         let (chosen, _) = plan(known, &guess, &places, &asked, count - first.len());
         let planned: Vec<_> = first
@@ -567,12 +566,12 @@ pub(super) fn probe(
 /// Explores from a flag, on what lies as far as is said, with noise of a touch; the flag's normal
 /// leans by up to 3°.
 fn explored(
-    kind: Kind,
+    kind: FeatureKind,
     flag: Point3<f64>,
     scan: &TriMesh,
     distance: &dyn Fn(&Point3<f64>) -> f64,
     rng: &mut Pcg64,
-) -> Result<Found, ExploreError> {
+) -> Result<ExplorationResult, ExploreError> {
     let params = PatternParams {
         sigma: 10e-6,
         touch_sigma: 5e-6,
@@ -613,7 +612,7 @@ fn a_slot_that_is_claimed_is_the_one_of_the_drawing() {
                 0.0,
             );
         let Ok(found) = explored(
-            Kind::Slot,
+            FeatureKind::Slot,
             flag,
             &plate_scan(1),
             &|p| plate.signed_distance(p),
@@ -626,7 +625,7 @@ fn a_slot_that_is_claimed_is_the_one_of_the_drawing() {
         }
         claimed += 1;
         let slot = found.feature.unwrap();
-        let number = |of: &Option<Measured<f64>>| of.as_ref().unwrap().value;
+        let number = |of: &Option<MeasuredValue<f64>>| of.as_ref().unwrap().value;
         let errors = [
             (slot.centre.value - SLOT).xy().norm(),
             (number(&slot.width) - 6e-3).abs(),
@@ -661,7 +660,7 @@ fn an_obstacle_in_a_slot_is_not_its_end() {
                 .min((p.x - x).hypot(p.y - y) - radius)
         };
         let flag = Point3::new(rng.random_range(20e-3..23e-3), 14e-3, TOP);
-        let found = explored(Kind::Slot, flag, &plate_scan(1), &distance, &mut rng);
+        let found = explored(FeatureKind::Slot, flag, &plate_scan(1), &distance, &mut rng);
         assert!(
             !found.as_ref().is_ok_and(|found| found.is_as_asked),
             "pin at {x} {y}, {radius}: {found:?}"
@@ -686,7 +685,7 @@ fn a_slot_without_ends_is_reported_as_such() {
     for _ in 0..10 {
         let flag = Point3::new(0.0, rng.random_range(-2e-3..2e-3), TOP);
         let found = explored(
-            Kind::Slot,
+            FeatureKind::Slot,
             flag,
             &flat([-100.0, 100.0], [-100.0, 100.0]),
             &distance,
@@ -717,7 +716,7 @@ fn a_hole_is_not_claimed_from_touches_of_something_else() {
             TOP,
         );
         let mut explorer = Explorer::new(
-            Some(Kind::Hole),
+            Some(FeatureKind::Hole),
             &flag,
             &Vector3::z_axis(),
             params,
@@ -765,11 +764,11 @@ fn a_hole_is_not_claimed_from_touches_of_something_else() {
 /// What ends the probing of a feature whose contacts are off by what a case says of a place and the
 /// number of its touch, m in O; with noise.
 fn displaced(
-    kind: Kind,
+    kind: FeatureKind,
     flag: [f64; 3],
     off: &dyn Fn(&Point3<f64>, usize) -> Vector3<f64>,
     rng: &mut Pcg64,
-) -> (Result<Found, ExploreError>, usize) {
+) -> (Result<ExplorationResult, ExploreError>, usize) {
     let plate = Plate::default();
     let params = PatternParams {
         sigma: 10e-6,
@@ -797,13 +796,13 @@ fn displaced(
 type Off = fn(&Point3<f64>, usize) -> Vector3<f64>;
 /// A feature in which contacts agree on another surface: its name, its flag, how far they are off,
 /// and in how many of ten the reason says so at the least.
-type Agreeing = (&'static str, (Kind, [f64; 3]), Off, usize);
+type Agreeing = (&'static str, (FeatureKind, [f64; 3]), Off, usize);
 
-const PLANE_AT: (Kind, [f64; 3]) = (Kind::Plane, [45.0, 8.0, 12.0]);
-const HOLE_AT: (Kind, [f64; 3]) = (Kind::Hole, [16.0, 36.0, 12.0]);
-const SLOT_AT: (Kind, [f64; 3]) = (Kind::Slot, [25.0, 14.0, 12.0]);
-const BOSS_AT: (Kind, [f64; 3]) = (Kind::Boss, [47.0, 25.0, 16.0]);
-const EDGE_AT: (Kind, [f64; 3]) = (Kind::Edge, [58.5, 24.5, 12.0]);
+const PLANE_AT: (FeatureKind, [f64; 3]) = (FeatureKind::Plane, [45.0, 8.0, 12.0]);
+const HOLE_AT: (FeatureKind, [f64; 3]) = (FeatureKind::Hole, [16.0, 36.0, 12.0]);
+const SLOT_AT: (FeatureKind, [f64; 3]) = (FeatureKind::Slot, [25.0, 14.0, 12.0]);
+const BOSS_AT: (FeatureKind, [f64; 3]) = (FeatureKind::Boss, [47.0, 25.0, 16.0]);
+const EDGE_AT: (FeatureKind, [f64; 3]) = (FeatureKind::Edge, [58.5, 24.5, 12.0]);
 
 /// In the others it was known as it was asked for before three of them were met.
 const AGREEING: [Agreeing; 3] = [
@@ -889,7 +888,7 @@ fn a_boss_is_measured_from_three_walls_at_the_least() {
             ..PatternParams::default()
         };
         let mut explorer = Explorer::new(
-            Some(Kind::Boss),
+            Some(FeatureKind::Boss),
             &flag,
             &Vector3::z_axis(),
             params,
@@ -937,7 +936,7 @@ pub(super) fn flat(x: [f64; 2], y: [f64; 2]) -> TriMesh {
 
 /// A block of 40 × 30 × 12 mm, from O on, with one feature near its edges: how far a place is from
 /// it, m.
-fn near_edges(kind: Option<Kind>, p: &Point3<f64>) -> f64 {
+fn near_edges(kind: Option<FeatureKind>, p: &Point3<f64>) -> f64 {
     let (half, middle) = (
         Vector3::new(20e-3, 15e-3, 6e-3),
         Vector3::new(20e-3, 15e-3, 6e-3),
@@ -947,11 +946,11 @@ fn near_edges(kind: Option<Kind>, p: &Point3<f64>) -> f64 {
     let about = |half: f64| ((p.x - 13e-3).abs() - half).max(0.0).hypot(p.y - 6e-3);
     match kind {
         // Ø 8, 2 mm from the edge
-        Some(Kind::Hole) => block.max(4e-3 - about(0.0)),
+        Some(FeatureKind::Hole) => block.max(4e-3 - about(0.0)),
         // 18 × 6, 4 mm deep, 3 mm from the edge
-        Some(Kind::Slot) => block.max((3e-3 - about(6e-3)).min(p.z - 8e-3)),
+        Some(FeatureKind::Slot) => block.max((3e-3 - about(6e-3)).min(p.z - 8e-3)),
         // Ø 8, 5 mm high, 2 mm from the edge
-        Some(Kind::Boss) => {
+        Some(FeatureKind::Boss) => {
             let (beside, above) = (about(0.0) - 4e-3, (p.z - 17e-3).max(10e-3 - p.z));
             block.min(if beside > 0.0 && above > 0.0 {
                 beside.hypot(above)
@@ -974,11 +973,11 @@ fn no_touch_is_planned_beside_the_part() {
     let endless = flat([-100.0, 100.0], [-100.0, 100.0]);
     let (mut beside, mut lost) = ([Vec::new(), Vec::new()], Vec::new());
     for (kind, flagged) in [
-        (Some(Kind::Hole), [13.0, 6.0, 12.0]),
-        (Some(Kind::Slot), [13.0, 6.0, 12.0]),
-        (Some(Kind::Boss), [13.0, 6.0, 17.0]),
-        (Some(Kind::Edge), [0.0, 4.0, 12.0]),
-        (Some(Kind::Plane), [3.0, 3.0, 12.0]),
+        (Some(FeatureKind::Hole), [13.0, 6.0, 12.0]),
+        (Some(FeatureKind::Slot), [13.0, 6.0, 12.0]),
+        (Some(FeatureKind::Boss), [13.0, 6.0, 17.0]),
+        (Some(FeatureKind::Edge), [0.0, 4.0, 12.0]),
+        (Some(FeatureKind::Plane), [3.0, 3.0, 12.0]),
         (None, [3.0, 3.0, 12.0]),
     ] {
         for seed in 0..10 {
@@ -1000,7 +999,8 @@ fn no_touch_is_planned_beside_the_part() {
                     let is_over = (-0.5e-3..40.5e-3).contains(&from.x)
                         && (-0.5e-3..30.5e-3).contains(&from.y);
                     // a wall that is touched from outside ends where the part does
-                    let is_wall = kind == Some(Kind::Edge) && planned.direction.z.abs() < 0.5;
+                    let is_wall =
+                        kind == Some(FeatureKind::Edge) && planned.direction.z.abs() < 0.5;
                     if planned.direction.z < -0.9 && !is_over || is_wall && from.y < -0.5e-3 {
                         beside[which]
                             .push(format!("{kind:?} seed {seed}, flag {flag}: {planned:?}"));
@@ -1018,14 +1018,14 @@ fn no_touch_is_planned_beside_the_part() {
                 }
                 let found = explorer.found();
                 let truth = match kind {
-                    Some(Kind::Edge) => Vector3::new(0.0, f64::NAN, TOP),
-                    Some(Kind::Plane) => Vector3::new(f64::NAN, f64::NAN, TOP),
+                    Some(FeatureKind::Edge) => Vector3::new(0.0, f64::NAN, TOP),
+                    Some(FeatureKind::Plane) => Vector3::new(f64::NAN, f64::NAN, TOP),
                     _ => Vector3::new(13e-3, 6e-3, TOP),
                 };
                 let is_found = match (&found, kind) {
                     (Ok(found), None) => found.touches > 20,
                     (
-                        Ok(Found {
+                        Ok(ExplorationResult {
                             feature: Some(feature),
                             ..
                         }),

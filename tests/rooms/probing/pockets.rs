@@ -5,7 +5,7 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 use touchup::features::fit::Ends;
-use touchup::features::{Kind, Measured, Walls};
+use touchup::features::{FeatureKind, MeasuredValue, Walls};
 use touchup::mesh::TriMesh;
 use touchup::probing::plan::{Explorer, PatternParams};
 
@@ -43,7 +43,7 @@ impl Pocket {
 /// or why not.
 fn measured(
     pocket: &Pocket,
-    kind: Kind,
+    kind: FeatureKind,
     scan: &TriMesh,
     seed: u64,
 ) -> Result<([f64; 4], usize), String> {
@@ -81,7 +81,7 @@ fn measured(
     if walls.ends != Ends::Straight {
         return Err(format!("its ends are {:?}", walls.ends));
     }
-    let number = |of: &Option<Measured<f64>>| of.as_ref().unwrap().value;
+    let number = |of: &Option<MeasuredValue<f64>>| of.as_ref().unwrap().value;
     let along = Rotation2::new(pocket.angle) * Vector2::x();
     let turned = feature.direction.unwrap().xy().perp(&along).abs();
     let off = (feature.centre.value - middle).xy().norm();
@@ -126,7 +126,7 @@ fn pockets_with_straight_ends_are_found_at_every_angle() {
                 corner * 1e3
             );
             count += 1;
-            match measured(&pocket, Kind::Pocket, &scan, u64::from(degrees)) {
+            match measured(&pocket, FeatureKind::Pocket, &scan, u64::from(degrees)) {
                 Ok((off, touches)) => {
                     worst = std::array::from_fn(|at| worst[at].max(off[at]));
                     if touches > 39 || off.iter().any(|off| *off > 25e-6) {
@@ -161,7 +161,7 @@ fn a_straight_ended_slot_near_edges_is_measured() {
             corner: 0.8e-3,
             angle: 0.0,
         };
-        let (off, _) = measured(&pocket, Kind::Slot, &scan, seed)
+        let (off, _) = measured(&pocket, FeatureKind::Slot, &scan, seed)
             .unwrap_or_else(|why| panic!("seed {seed}: {why}"));
         assert!(off.iter().all(|off| *off < 25e-6), "seed {seed}: {off:?}");
     }

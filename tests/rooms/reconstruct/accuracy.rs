@@ -4,9 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use touchup::mesh::{FaceId, FaceTree, TriMesh, VertexId};
-use touchup::reconstruct::{Patched, Patcher, PatcherParams, Support};
+use touchup::reconstruct::{PatchedMesh, Patcher, PatcherParams, Support};
 use touchup::sim::{
-    Moment, Plate, StylusParams, Surface, TruthFeature, TruthShape, measure_quality,
+    Plate, StylusParams, Surface, TrueState, TruthFeature, TruthShape, measure_quality,
 };
 use touchup::stylus::{Sample, TipShape, Wrench};
 
@@ -17,7 +17,7 @@ use crate::soundness::{intersections, soundness};
 struct Case {
     scan: TriMesh,
     contacts: Vec<Point3<f64>>,
-    patched: Patched,
+    patched: PatchedMesh,
 }
 
 const FLAT: TipShape = TipShape::Flat {
@@ -52,7 +52,7 @@ fn case_with(stylus: &StylusParams, seed: u64, change: impl Fn(&mut PatcherParam
         .for_each(|contact| patcher.push(contact));
     patcher.flush();
     let patched = patcher.patched(&scan, &FaceTree::new(&scan)).unwrap();
-    let contact_points = |moment: &Moment| {
+    let contact_points = |moment: &TrueState| {
         moment
             .contacts
             .iter()

@@ -3,7 +3,7 @@
 
 use nalgebra::{Point3, UnitVector3, Vector3};
 use touchup::mesh::{FaceTree, TriMesh};
-use touchup::reconstruct::{Patched, Patcher, PatcherParams, Support};
+use touchup::reconstruct::{PatchedMesh, Patcher, PatcherParams, Support};
 use touchup::sim::{Bounds, Stroke, StylusParams, Surface, SurfacePoint, touch};
 use touchup::stylus::{
     ContactEstimator, ContactEstimatorParams, SyncParams, Synchroniser, TipParams,
@@ -204,7 +204,7 @@ fn reconstructed(
     path: &[Stroke],
     friction: f64,
     seed: u64,
-) -> (Patcher, Patched) {
+) -> (Patcher, PatchedMesh) {
     let stylus = StylusParams {
         friction,
         ..StylusParams::default()

@@ -3,7 +3,7 @@
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use touchup::mesh::{FaceTree, TriMesh, VertexId};
-use touchup::reconstruct::{Patched, Patcher, PatcherParams, Support};
+use touchup::reconstruct::{PatchedMesh, Patcher, PatcherParams, Support};
 use touchup::stylus::{ContactEstimator, ContactEstimatorParams, Sample, TipParams, Wrench};
 
 use crate::common::grid;
@@ -44,7 +44,7 @@ fn scan(noise: f64) -> TriMesh {
 
 /// A ball slides over z = 0 in lines 0.8 mm apart, over a hole in the middle it goes down by
 /// `sinks` (m) and up again.
-fn patched(scan: &TriMesh, sinks: f64) -> Patched {
+fn patched(scan: &TriMesh, sinks: f64) -> PatchedMesh {
     let mut contacts = ContactEstimator::new(ContactEstimatorParams::new(TipParams {
         radius: RADIUS,
         stiffness: None,

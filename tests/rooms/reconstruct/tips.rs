@@ -4,8 +4,8 @@
 use nalgebra::{Isometry3, Point3, Vector3};
 use touchup::reconstruct::{TipTouch, TouchFinder, TouchFinderParams};
 use touchup::sim::{
-    Lines, Moment, PathParams, Plate, RasterRegion, Stroke, StylusParams, Surface, plan_demo,
-    raster, touch,
+    PathParams, Plate, RasterDirection, RasterRegion, Stroke, StylusParams, Surface, TrueState,
+    plan_demo, raster, touch,
 };
 use touchup::stylus::{
     ContactEstimator, ContactEstimatorParams, SyncParams, Synchroniser, TipBody, TipParams,
@@ -35,11 +35,11 @@ fn path(stylus: &StylusParams, hand: &PathParams) -> Vec<Stroke> {
         floor: 8e-3,
         clear: 20e-3,
     };
-    raster(&region, Lines::AlongX, hand).unwrap()
+    raster(&region, RasterDirection::AlongX, hand).unwrap()
 }
 
 /// Contacts, with the truth at that time.
-fn contacts(stylus: &StylusParams, seed: u64) -> Vec<(TipTouch, Moment)> {
+fn contacts(stylus: &StylusParams, seed: u64) -> Vec<(TipTouch, TrueState)> {
     let plate = Plate::default();
     let hand = PathParams {
         radius: stylus.radius,
@@ -97,7 +97,7 @@ fn tips() -> [(&'static str, StylusParams); 6] {
 /// Share of the samples in contact with an estimated place, and median and 90th percentile of the
 /// distance of their points from the part, mm, and of the error of their normals, degrees, where
 /// one place alone touched.
-fn quality(contacts: &[(TipTouch, Moment)]) -> [f64; 5] {
+fn quality(contacts: &[(TipTouch, TrueState)]) -> [f64; 5] {
     let plate = Plate::default();
     let (mut distances, mut angles, mut touching) = (Vec::new(), Vec::new(), 0);
     for (touch, moment) in contacts {
@@ -134,7 +134,7 @@ fn quantiles(values: &mut [f64]) -> [f64; 2] {
 /// How deep the tip is in the part at most, m.
 ///
 /// - `known`: contacts are compared with the tip up to this height, m.
-fn depth(stylus: &StylusParams, known: f64, contacts: &[(TipTouch, Moment)]) -> f64 {
+fn depth(stylus: &StylusParams, known: f64, contacts: &[(TipTouch, TrueState)]) -> f64 {
     let plate = Plate::default();
     let body = TipBody::new(stylus.shape, stylus.radius).unwrap();
     let (mut deepest, mut touching) = (0.0f64, 0);

@@ -10,7 +10,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 use touchup::mesh::{FaceTree, TriMesh};
 use touchup::reconstruct::{
-    CalibrationParams, Patched, Patcher, PatcherParams, Support, TouchFinder, TouchFinderParams,
+    CalibrationParams, PatchedMesh, Patcher, PatcherParams, Support, TouchFinder, TouchFinderParams,
 };
 use touchup::sim::{
     PathParams, Plate, ScannerParams, SensorParams, StylusParams, Surface, Touch, plan_demo, touch,
@@ -68,7 +68,7 @@ fn patcher_of(messages: &[Message], params: PatcherParams) -> Patcher {
     patcher
 }
 
-fn patched(patcher: &mut Patcher, scan: &TriMesh) -> Patched {
+fn patched(patcher: &mut Patcher, scan: &TriMesh) -> PatchedMesh {
     patcher.patched(scan, &FaceTree::new(scan)).unwrap()
 }
 
@@ -104,7 +104,7 @@ struct Normalised {
 }
 
 impl Normalised {
-    fn add(&mut self, patched: &Patched, surface: &dyn Surface, support: Support) {
+    fn add(&mut self, patched: &PatchedMesh, surface: &dyn Surface, support: Support) {
         let areas = areas(&patched.mesh);
         for (at, p) in patched
             .mesh

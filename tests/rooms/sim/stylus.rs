@@ -2,8 +2,9 @@
 
 use super::*;
 use touchup::sim::{
-    Habit, Lines, Moment, PathParams, RasterRegion, SensorParams, Stroke, StylusParams, Touch,
-    TruthShape, plan_demo, plan_mesh, plan_sides, plan_waterlines, push_ball, raster, touch,
+    Habit, PathParams, RasterDirection, RasterRegion, SensorParams, Stroke, StylusParams, Touch,
+    TrueState, TruthShape, plan_demo, plan_mesh, plan_sides, plan_waterlines, push_ball, raster,
+    touch,
 };
 use touchup::stylus::{Message, StampedPose, StampedWrench};
 
@@ -77,7 +78,7 @@ fn demo_lasts_a_minute_and_looks_like_a_hand() {
     println!("{n} ms, contact {share:.3}, force {p5:.2} {p50:.2} {p99:.2}");
     assert!((0.6..0.95).contains(&share));
     assert!((2.0..3.0).contains(&p50) && p99 < 4.2);
-    let tilt = |m: &Moment| {
+    let tilt = |m: &TrueState| {
         (m.pose_ot.rotation * Vector3::z())
             .angle(&Vector3::z())
             .to_degrees()
@@ -370,7 +371,7 @@ fn senseless_paths_are_refused() {
         let params = PathParams { pitch, ..base };
         assert!(
             matches!(
-                raster(&far(0.01), Lines::AlongX, &params),
+                raster(&far(0.01), RasterDirection::AlongX, &params),
                 Err(SimError::BadParameter { .. })
             ),
             "{pitch}"
@@ -380,7 +381,7 @@ fn senseless_paths_are_refused() {
     for x in [-0.01, f64::NAN, f64::INFINITY] {
         assert!(
             matches!(
-                raster(&far(x), Lines::AlongX, &base),
+                raster(&far(x), RasterDirection::AlongX, &base),
                 Err(SimError::BadParameter { .. })
             ),
             "{x}"
@@ -404,7 +405,7 @@ fn senseless_paths_are_refused() {
     }
     // lines every 2 mm of 10 mm: six, of two ends each
     assert_eq!(
-        raster(&far(0.02), Lines::AlongX, &base).unwrap()[1]
+        raster(&far(0.02), RasterDirection::AlongX, &base).unwrap()[1]
             .points
             .len(),
         12
@@ -424,7 +425,7 @@ fn ball_slides_over_any_mesh_from_any_side() {
         let touched = touch(&surface, &path, &StylusParams::default(), 4).unwrap();
         // beside the part, where it goes over the edge, the ball is free
         let bounds = surface.bounds();
-        let is_over = |m: &&Moment| {
+        let is_over = |m: &&TrueState| {
             let p = m.pose_ot.translation.vector;
             (0..3).all(|i| view[i] != 0.0 || (bounds.min[i]..=bounds.max[i]).contains(&p[i]))
         };
@@ -590,7 +591,7 @@ fn a_ball_that_is_caught_is_taken_out_and_around_the_part() {
         ..StylusParams::default()
     };
     let touched = touch(&plate, &path, &params, 1).unwrap();
-    let centre = |m: &Moment| Point3::from(m.pose_ot.translation.vector);
+    let centre = |m: &TrueState| Point3::from(m.pose_ot.translation.vector);
     let deepest = touched
         .moments
         .iter()

@@ -4,9 +4,9 @@ use nalgebra::{Isometry3, Matrix3, Point2, UnitQuaternion};
 
 use super::*;
 use touchup::sim::{
-    Bounds, DrawnWorld, Habit, Lines, Moment, PathParams, RasterRegion, ScannerParams,
-    SensorParams, SimWorld, Stroke, StylusParams, TipBending, ToldOff, Touch, plan_mesh, raster,
-    scan, touch,
+    Bounds, DrawnWorld, Habit, PathParams, RasterDirection, RasterRegion, ScannerParams,
+    SensorParams, SimWorld, Stroke, StylusParams, TipBending, ToldOff, Touch, TrueState, plan_mesh,
+    raster, scan, touch,
 };
 use touchup::stylus::{Message, StampedPose, StampedWrench};
 
@@ -21,7 +21,7 @@ fn rub() -> Vec<Stroke> {
     };
     raster(
         &region,
-        Lines::AlongX,
+        RasterDirection::AlongX,
         &PathParams {
             pitch: 4e-3,
             ..PathParams::default()
@@ -75,7 +75,7 @@ fn rms(values: impl IntoIterator<Item = f64>) -> f64 {
 }
 
 /// Size of the true force at a time, s: linear between two moments.
-fn force_at(moments: &[Moment], t: f64) -> f64 {
+fn force_at(moments: &[TrueState], t: f64) -> f64 {
     let at = (t * 1e3).clamp(0.0, (moments.len() - 2) as f64);
     let share = at.fract();
     moments[at as usize].force_o.norm() * (1.0 - share)
@@ -84,7 +84,7 @@ fn force_at(moments: &[Moment], t: f64) -> f64 {
 
 /// By how much the stamps of the wrenches are late, s: where their forces fit best to the true
 /// ones.
-fn delay(moments: &[Moment], wrenches: &[StampedWrench]) -> f64 {
+fn delay(moments: &[TrueState], wrenches: &[StampedWrench]) -> f64 {
     let misfit = |delay: f64| {
         rms(wrenches
             .iter()

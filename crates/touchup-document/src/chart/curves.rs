@@ -3,7 +3,7 @@
 use maud::{Markup, html};
 
 use super::element::{label, points, px, text_width, upward_label};
-use super::extent::Extent;
+use super::extent::AxisExtent;
 use super::frame::{ChartSize, Frame};
 use super::looks::Looks;
 use crate::figure::{Figure, LineStroke, Mark, Series};
@@ -27,7 +27,7 @@ struct Layout {
 }
 
 impl Layout {
-    fn of(series: &[Series], y: &Extent, size: ChartSize) -> Self {
+    fn of(series: &[Series], y: &AxisExtent, size: ChartSize) -> Self {
         let ticks = y.ticks();
         let number = widest(ticks.iter().map(|tick| tick.label.as_str()), 12.0);
         let name = widest(series.iter().map(|one| one.name.as_str()), 12.5) + SAMPLE;
@@ -74,8 +74,8 @@ pub(super) fn draw(
     size: ChartSize,
 ) -> (Markup, f64) {
     let marks = || series.iter().flat_map(|series| &series.marks);
-    let x = Extent::around(&figure.x, marks().flat_map(|mark| mark.x.numbers()));
-    let y = Extent::around(&figure.y, marks().flat_map(|mark| mark.y.numbers()));
+    let x = AxisExtent::around(&figure.x, marks().flat_map(|mark| mark.x.numbers()));
+    let y = AxisExtent::around(&figure.y, marks().flat_map(|mark| mark.y.numbers()));
     let Layout {
         frame,
         legend: corner,
@@ -109,11 +109,11 @@ pub(super) fn draw(
     (drawing, if hidden > 0 { bottom + 18.0 } else { bottom })
 }
 
-fn place(frame: &Frame, [x, y]: [&Extent; 2], mark: &Mark) -> Option<[f64; 2]> {
+fn place(frame: &Frame, [x, y]: [&AxisExtent; 2], mark: &Mark) -> Option<[f64; 2]> {
     Some(frame.place([x.place(mark.x.median)?, y.place(mark.y.median)?]))
 }
 
-fn draw_series(frame: &Frame, extents: [&Extent; 2], looks: &Looks, series: &Series) -> Markup {
+fn draw_series(frame: &Frame, extents: [&AxisExtent; 2], looks: &Looks, series: &Series) -> Markup {
     let look = looks.look(&series.name);
     let places = series.marks.iter().map(|mark| place(frame, extents, mark));
     let places: Vec<Option<[f64; 2]>> = places.collect();
@@ -139,8 +139,13 @@ fn draw_series(frame: &Frame, extents: [&Extent; 2], looks: &Looks, series: &Ser
 
 /// Bars from the 10th to the 90th percentile of both values, if the two differ: a line with a short
 /// stroke across each end.
-fn bars(frame: &Frame, [x, y]: [&Extent; 2], mark: &Mark, [left, top]: [f64; 2]) -> Vec<String> {
-    let ends = |extent: &Extent, axis: usize, [_, p10, p90]: [f64; 3]| {
+fn bars(
+    frame: &Frame,
+    [x, y]: [&AxisExtent; 2],
+    mark: &Mark,
+    [left, top]: [f64; 2],
+) -> Vec<String> {
+    let ends = |extent: &AxisExtent, axis: usize, [_, p10, p90]: [f64; 3]| {
         let ends = [extent.place(p10)?, extent.place(p90)?].map(|end| frame.place([end; 2])[axis]);
         ((ends[0] - ends[1]).abs() >= 1.0).then(|| ends.map(px))
     };
@@ -155,7 +160,7 @@ fn bars(frame: &Frame, [x, y]: [&Extent; 2], mark: &Mark, [left, top]: [f64; 2])
     level.into_iter().chain(upward).collect()
 }
 
-fn band(frame: &Frame, [x, y]: [&Extent; 2], series: &Series) -> Markup {
+fn band(frame: &Frame, [x, y]: [&AxisExtent; 2], series: &Series) -> Markup {
     let edge = |upward: fn(&Mark) -> f64| {
         let at =
             move |mark: &Mark| Some(frame.place([x.place(mark.x.median)?, y.place(upward(mark))?]));

@@ -13,7 +13,7 @@ const ABOUT: f64 = 6.0;
 const WRITTEN_OUT: std::ops::RangeInclusive<i32> = -2..=4;
 
 /// Extent of an axis, in the coordinate that is even along it: the value, or its decimal logarithm.
-pub(super) struct Extent {
+pub(super) struct AxisExtent {
     scale: Scale,
     low: f64,
     high: f64,
@@ -30,7 +30,7 @@ pub(super) struct Tick {
     pub label: String,
 }
 
-impl Extent {
+impl AxisExtent {
     /// The ends of the axis, or a margin around `values`; ignores values without a place.
     pub fn around(axis: &Axis, values: impl Iterator<Item = f64>) -> Self {
         let scale = axis.scale;
@@ -161,7 +161,7 @@ mod tests {
     }
 
     fn labels(scale: Scale, values: &[f64]) -> Vec<String> {
-        let ticks = Extent::around(&axis(scale), values.iter().copied()).ticks();
+        let ticks = AxisExtent::around(&axis(scale), values.iter().copied()).ticks();
         ticks
             .into_iter()
             .map(|tick| tick.label)
@@ -187,7 +187,7 @@ mod tests {
 
     #[test]
     fn an_axis_between_two_values_has_numbers_at_both_and_in_the_middle() {
-        let extent = Extent::around(
+        let extent = AxisExtent::around(
             &axis(Scale::Linear).within([-180.0, 180.0]),
             [3.0].into_iter(),
         );
@@ -201,7 +201,7 @@ mod tests {
 
     #[test]
     fn what_cannot_be_shown_has_no_place() {
-        let extent = Extent::around(
+        let extent = AxisExtent::around(
             &axis(Scale::Log),
             [0.0, -1.0, f64::NAN, f64::INFINITY, 1.0, 10.0].into_iter(),
         );
@@ -213,7 +213,7 @@ mod tests {
         assert!((extent.place(10f64.sqrt()).unwrap() - 0.5).abs() < 1e-12);
         for values in [&[][..], &[0.0], &[5.0], &[f64::NAN], &[1e308, -1e308]] {
             for scale in [Scale::Linear, Scale::Log] {
-                let ticks = Extent::around(&axis(scale), values.iter().copied()).ticks();
+                let ticks = AxisExtent::around(&axis(scale), values.iter().copied()).ticks();
                 assert!(
                     ticks.len() < 100 && ticks.iter().all(|tick| tick.at.is_finite()),
                     "{values:?} {ticks:?}"

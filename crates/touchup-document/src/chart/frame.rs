@@ -3,7 +3,7 @@
 use maud::{Markup, html};
 
 use super::element::{label, points, px, text_width};
-use super::extent::{Extent, Tick};
+use super::extent::{AxisExtent, Tick};
 
 /// Least gap between labels; a closer label is left out.
 const LEAST_GAP: f64 = 8.0;
@@ -67,7 +67,7 @@ impl Frame {
     }
 
     /// Gridlines and their numbers.
-    pub fn grid(&self, x: &Extent, y: &Extent) -> Markup {
+    pub fn grid(&self, x: &AxisExtent, y: &AxisExtent) -> Markup {
         let (xs, ys) = (x.ticks(), y.ticks());
         let upward = xs
             .iter()

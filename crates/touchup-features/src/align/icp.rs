@@ -36,7 +36,7 @@ impl Default for IcpParams {
 
 /// One of six independent small motions about [`IcpFit::centre`], and its constraint by the target.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Motion {
+pub struct IcpMotion {
     /// shift of the centre, in the frame of the target; with `turn` of unit length
     pub shift: Vector3<f64>,
     /// rotation vector times [`IcpFit::lever`]: the shift that it gives on average
@@ -46,7 +46,7 @@ pub struct Motion {
     pub share: f64,
 }
 
-impl Motion {
+impl IcpMotion {
     /// Whether the target determines this motion.
     pub(crate) fn is_determined(&self) -> bool {
         self.share >= LEAST_SHARE
@@ -71,13 +71,13 @@ pub struct IcpFit {
     /// Root mean square distance of the points from the centre, m.
     pub lever: f64,
     /// Independent motions, the least determined first.
-    pub motions: [Motion; 6],
+    pub motions: [IcpMotion; 6],
 }
 
 impl IcpFit {
     /// The motions that leave the fit as it is: a sphere turns, a plane slides. In these the pose
     /// stays as in the start.
-    pub fn undetermined(&self) -> impl Iterator<Item = &Motion> {
+    pub fn undetermined(&self) -> impl Iterator<Item = &IcpMotion> {
         self.motions.iter().filter(|motion| !motion.is_determined())
     }
 }
@@ -399,10 +399,10 @@ impl<'a> Search<'a> {
 
     fn fit(&self, round: &Round) -> IcpFit {
         let eigen = round.information.symmetric_eigen();
-        let mut motions: [Motion; 6] = std::array::from_fn(|i| {
+        let mut motions: [IcpMotion; 6] = std::array::from_fn(|i| {
             let v = eigen.eigenvectors.column(i);
             let [shift, turn] = [0, 3].map(|at| v.fixed_rows::<3>(at).into_owned());
-            Motion {
+            IcpMotion {
                 shift,
                 turn,
                 share: eigen.eigenvalues[i].max(0.0),

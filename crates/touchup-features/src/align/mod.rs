@@ -10,6 +10,6 @@ pub use by_features::{
     align_features,
 };
 pub use datum_fit::{DatumFit, DatumFitError, DatumPair, fit_datums};
-pub use icp::{IcpError, IcpFit, IcpParams, Motion, icp};
+pub use icp::{IcpError, IcpFit, IcpMotion, IcpParams, icp};
 pub(crate) use pairs::closest_motion;
 pub use pairs::{PairSide, PairsError, PairsFit, PairsParams, PointPair, fit_pairs};

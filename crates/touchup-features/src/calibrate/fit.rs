@@ -59,13 +59,13 @@ const ROUNDING: f64 = 1e-12;
 
 /// A direction of x that the equations do not determine.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Undetermined {
+pub(super) struct UndeterminedDirection {
     /// how well it is observed, by [`spread`]
     pub spread: f64,
     pub axis: Vector3<f64>,
 }
 
-impl Undetermined {
+impl UndeterminedDirection {
     /// Rotation of the poses to either side across the axis, if A is a rotation, rad.
     pub fn angle(&self) -> f64 {
         self.spread.clamp(0.0, 1.0).sqrt().asin()
@@ -73,12 +73,12 @@ impl Undetermined {
 }
 
 /// The least determined direction, over the kept observations.
-pub(super) fn least_determined(equations: &[Equation], kept: &[bool]) -> Undetermined {
+pub(super) fn least_determined(equations: &[Equation], kept: &[bool]) -> UndeterminedDirection {
     let weights: Vec<f64> = kept.iter().map(|&kept| f64::from(u8::from(kept))).collect();
     let (n, mean, _) = means(equations, &weights);
     let eigen = SymmetricEigen::new(normal(equations, &weights, &mean) / n);
     let i = eigen.eigenvalues.imin();
-    Undetermined {
+    UndeterminedDirection {
         spread: eigen.eigenvalues[i],
         axis: eigen.eigenvectors.column(i).into_owned(),
     }
@@ -91,7 +91,7 @@ pub(super) fn least_determined(equations: &[Equation], kept: &[bool]) -> Undeter
 pub(super) fn fit(
     equations: &[Equation],
     smallest_spread: f64,
-) -> Result<CalibrationFit, Undetermined> {
+) -> Result<CalibrationFit, UndeterminedDirection> {
     let fitted = |kept: Vec<bool>| {
         let least = least_determined(equations, &kept);
         if least.spread < smallest_spread {

@@ -7,7 +7,7 @@
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use super::StaticPose;
-use super::fit::{CalibrationFit, Equation, Undetermined, fit, least_determined};
+use super::fit::{CalibrationFit, Equation, UndeterminedDirection, fit, least_determined};
 use touchup_method::stylus::{Payload, Wrench, WrenchFrame};
 
 /// Settings of [`fit_payload`].
@@ -202,7 +202,7 @@ pub fn fit_payload(
         return Err(PayloadError::TooFew { count: poses.len() });
     }
     let forces = equations(poses, params);
-    let too_alike = |least: Undetermined| PayloadError::TooAlike {
+    let too_alike = |least: UndeterminedDirection| PayloadError::TooAlike {
         tilt_deg: least.angle().to_degrees(),
         axis: least.axis.into(),
     };
@@ -298,7 +298,7 @@ fn fit_torque(
     };
     let smallest = SMALLEST_CENTRE_SPREAD * force.x.norm_squared();
     let equations = torques(&force.x);
-    let undetermined = |least: Undetermined| PayloadError::CentreUndetermined {
+    let undetermined = |least: UndeterminedDirection| PayloadError::CentreUndetermined {
         axis: least.axis.into(),
     };
     let mut found = fit(&equations, smallest).map_err(undetermined)?;

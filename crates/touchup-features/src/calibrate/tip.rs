@@ -6,7 +6,7 @@
 
 use nalgebra::{Isometry3, Vector3};
 
-use super::fit::{CalibrationFit, Equation, Undetermined, fit, least_determined};
+use super::fit::{CalibrationFit, Equation, UndeterminedDirection, fit, least_determined};
 use super::payload::VectorEstimate;
 
 /// A pose of the tracked stylus H in the frame W of the poses.
@@ -123,7 +123,7 @@ pub fn fit_tip(poses: &[SwingPose], params: &TipFitParams) -> Result<TipFit, Tip
             count: equations.len(),
         });
     }
-    let too_small = |least: Undetermined| TipError::TooSmall {
+    let too_small = |least: UndeterminedDirection| TipError::TooSmall {
         swing_deg: least.angle().to_degrees(),
         wanted_deg: params.smallest_swing.to_degrees(),
         axis: least.axis.into(),

@@ -67,7 +67,7 @@ const FLAT: f64 = 0.1e-3;
 /// Number of Newton steps: each squares the error; plenty from some mm and degrees.
 const ROUNDS: usize = 12;
 
-type Six = SVector<f64, 6>;
+type PlaneTipUnknowns = SVector<f64, 6>;
 
 /// Offset of the ball.
 ///
@@ -89,8 +89,8 @@ pub fn fit_tip_by_plane(
     let middle = mean(poses.iter().map(|pose| pose.translation.vector));
     let [u, v] = tangent_basis(normal);
     // d, two slopes of the plane, h
-    let mut x = Six::zeros();
-    let equations = |x: &Six| {
+    let mut x = PlaneTipUnknowns::zeros();
+    let equations = |x: &PlaneTipUnknowns| {
         let (offset, out) = (
             x.fixed_rows::<3>(0).into_owned(),
             normal.into_inner() + u * x[3] + v * x[4],
@@ -98,7 +98,7 @@ pub fn fit_tip_by_plane(
         let row = |pose: &Isometry3<f64>| {
             let centre = pose.translation.vector - middle + pose.rotation * offset;
             let by_offset = pose.rotation.inverse() * out;
-            let by = Six::new(
+            let by = PlaneTipUnknowns::new(
                 by_offset.x,
                 by_offset.y,
                 by_offset.z,

@@ -80,7 +80,7 @@ mod tests {
     use rand_pcg::Pcg64;
 
     use super::*;
-    use touchup_geometry::mesh::Alone;
+    use touchup_geometry::mesh::SerialWorkers;
 
     #[test]
     fn the_nearest_of_a_lattice_is_found_also_from_far_away() {
@@ -92,7 +92,7 @@ mod tests {
             Point3::new(-3.0, 0.0, 4.0),
             Point3::new(9.0, 9.0, 109.0),
         ];
-        let found = cloud_distances(&points, &lattice, &Alone).unwrap();
+        let found = cloud_distances(&points, &lattice, &SerialWorkers).unwrap();
         for (found, by_hand) in found.iter().zip([0.1, 3.0, 100.0]) {
             assert!((found - by_hand).abs() < 1e-12, "{found}");
         }
@@ -110,7 +110,7 @@ mod tests {
         };
         let cloud = spread(500, 0.0);
         let points = [spread(1500, 0.0), cloud.clone(), spread(1500, 40.0)].concat();
-        let found = cloud_distances(&points, &cloud, &Alone).unwrap();
+        let found = cloud_distances(&points, &cloud, &SerialWorkers).unwrap();
         for (p, found) in points.iter().zip(found) {
             let by_hand = cloud
                 .iter()
@@ -130,11 +130,11 @@ mod tests {
             .map(|i| Point3::new(if i % 2 == 0 { x } else { x.next_up() }, 0.0, 0.0))
             .collect();
         assert_eq!(
-            cloud_distances(&[Point3::new(x, 1.0, 0.0)], &cloud, &Alone).unwrap(),
+            cloud_distances(&[Point3::new(x, 1.0, 0.0)], &cloud, &SerialWorkers).unwrap(),
             [1.0]
         );
         assert_eq!(
-            cloud_distances(&[Point3::origin()], &[], &Alone),
+            cloud_distances(&[Point3::origin()], &[], &SerialWorkers),
             Err(CompareError::NoPoints)
         );
     }

@@ -118,12 +118,12 @@ pub struct Comparison {
 }
 
 /// Deviations, m, with the region of each; `None`: in no region.
-struct Sorted {
+struct RegionDeviations {
     values: Vec<f64>,
     regions: Vec<Option<SupportRegion>>,
 }
 
-impl Sorted {
+impl RegionDeviations {
     fn within(&self, region: Option<SupportRegion>) -> Vec<f64> {
         let both = self.values.iter().zip(&self.regions);
         both.filter(|(_, at)| region.is_none() || region == **at)
@@ -147,11 +147,11 @@ struct Foot {
 
 /// All measurements, before the summary by region.
 struct MeasuredDeviations {
-    to_truth: Sorted,
-    to_mesh: Sorted,
-    vertices: Sorted,
-    cloud_to_truth: Sorted,
-    truth_to_cloud: Sorted,
+    to_truth: RegionDeviations,
+    to_mesh: RegionDeviations,
+    vertices: RegionDeviations,
+    cloud_to_truth: RegionDeviations,
+    truth_to_cloud: RegionDeviations,
     tilts: Vec<(Tilt, SupportRegion)>,
     vertex_deviations: Vec<f64>,
 }
@@ -246,7 +246,7 @@ fn measure(
     let truth_feet = feet(&truth_points, mesh, workers)?;
     let deviations = |feet: &[Foot]| feet.iter().map(|foot| foot.deviation).collect::<Vec<f64>>();
     let on_true_part = |feet: &[Foot]| feet.iter().map(|foot| foot.point).collect::<Vec<_>>();
-    let to_truth = Sorted {
+    let to_truth = RegionDeviations {
         values: deviations(&mesh_feet),
         regions: regions_of(
             regions,
@@ -255,7 +255,7 @@ fn measure(
             workers,
         )?,
     };
-    let vertices = Sorted {
+    let vertices = RegionDeviations {
         values: deviations(&vertex_feet),
         regions: regions_of(
             regions,
@@ -264,13 +264,16 @@ fn measure(
             workers,
         )?,
     };
-    let to_mesh = Sorted {
+    let to_mesh = RegionDeviations {
         // a true point outside of the mesh is material that the mesh lacks
         values: truth_feet.iter().map(|foot| -foot.deviation).collect(),
         regions: regions_of_truth(regions, truth, on_truth, &truth_feet, mesh, reach, workers)?,
     };
-    let cloud = |points: &[_], cloud: &[_], like: &Sorted| -> Result<Sorted, CompareError> {
-        Ok(Sorted {
+    let cloud = |points: &[_],
+                 cloud: &[_],
+                 like: &RegionDeviations|
+     -> Result<RegionDeviations, CompareError> {
+        Ok(RegionDeviations {
             values: cloud_distances(points, cloud, workers)?,
             regions: like.regions.clone(),
         })

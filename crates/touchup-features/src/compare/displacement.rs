@@ -136,7 +136,7 @@ pub fn moved_count(mesh: &TriMesh, displacements: &[Displacement], k: f64) -> us
 #[cfg(test)]
 mod tests {
     use super::*;
-    use touchup_geometry::mesh::{Alone, FaceTree};
+    use touchup_geometry::mesh::{FaceTree, SerialWorkers};
 
     /// A square of 4 × 4 cells of 1 mm at height `z` (m) of each vertex, by column and row.
     fn sheet(z: impl Fn(usize, usize) -> f64, is_turned: bool) -> TriMesh {
@@ -198,7 +198,7 @@ mod tests {
             DisplacedFrom::Before,
             high_shape,
             None,
-            &Alone,
+            &SerialWorkers,
         )
         .unwrap();
         let from_high = displacements_to_surface(
@@ -207,7 +207,7 @@ mod tests {
             DisplacedFrom::After,
             low_shape,
             Some(&sigma),
-            &Alone,
+            &SerialWorkers,
         )
         .unwrap();
         for displaced in [from_low, from_high] {
@@ -219,9 +219,15 @@ mod tests {
             );
             assert_eq!(moved_count(&low, &displaced, 2.0), 10);
         }
-        let unknown =
-            displacements_to_surface(&low, None, DisplacedFrom::Before, high_shape, None, &Alone)
-                .unwrap();
+        let unknown = displacements_to_surface(
+            &low,
+            None,
+            DisplacedFrom::Before,
+            high_shape,
+            None,
+            &SerialWorkers,
+        )
+        .unwrap();
         assert_eq!(
             moved_count(&low, &unknown, 2.0),
             25,

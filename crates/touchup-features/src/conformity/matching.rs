@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use crate::features::{Feature, Kind};
+use crate::features::{Feature, FeatureKind};
 
 /// A detected feature.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -10,7 +10,7 @@ pub struct FeaturePlace {
     /// its id
     pub id: u32,
     /// its kind
-    pub kind: Kind,
+    pub kind: FeatureKind,
     /// m, in O
     pub centre: Point3<f64>,
     /// unit vector
@@ -36,7 +36,7 @@ impl FeaturePlace {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SoughtFeature {
     /// its kind
-    pub kind: Kind,
+    pub kind: FeatureKind,
     /// id of the detected feature, if the drawing names it
     pub id: Option<u32>,
     /// nominal centre, m, in O
@@ -122,8 +122,8 @@ fn match_one(sought: &SoughtFeature, found: &[FeaturePlace], reach: f64) -> Feat
 fn off(place: &FeaturePlace, nominal: &Point3<f64>) -> f64 {
     let off = place.centre - nominal;
     match (place.kind, &place.axis) {
-        (Kind::Plane, Some(normal)) => off.dot(normal).abs(),
-        (Kind::Corner, _) | (_, None) => off.norm(),
+        (FeatureKind::Plane, Some(normal)) => off.dot(normal).abs(),
+        (FeatureKind::Corner, _) | (_, None) => off.norm(),
         (_, Some(axis)) => off.cross(axis).norm(),
     }
 }
@@ -150,7 +150,7 @@ mod tests {
         let centre = Point3::new(x_mm, 0.0, z_mm) * 1e-3;
         FeaturePlace {
             id,
-            kind: Kind::Hole,
+            kind: FeatureKind::Hole,
             centre,
             axis: Some(Vector3::z()),
             size: Some(diameter_mm * 1e-3),
@@ -160,7 +160,7 @@ mod tests {
     fn sought(x_mm: f64, z_mm: f64, diameter_mm: f64) -> SoughtFeature {
         let place = Some(Point3::new(x_mm, 0.0, z_mm) * 1e-3);
         SoughtFeature {
-            kind: Kind::Hole,
+            kind: FeatureKind::Hole,
             id: None,
             place,
             size: Some(diameter_mm * 1e-3),
@@ -171,7 +171,7 @@ mod tests {
     fn the_nearest_of_its_kind_is_found_also_from_the_other_side() {
         let found = [hole(4, 0.1, 12.0, 8.0), hole(7, 20.0, 12.0, 8.0)];
         let boss = SoughtFeature {
-            kind: Kind::Boss,
+            kind: FeatureKind::Boss,
             ..sought(0.0, 12.0, 8.0)
         };
         let matches = match_features(
@@ -255,7 +255,7 @@ mod tests {
     fn a_plane_is_matched_along_its_normal() {
         let plane = |id, x_mm: f64, z_mm: f64| FeaturePlace {
             id,
-            kind: Kind::Plane,
+            kind: FeatureKind::Plane,
             centre: Point3::new(x_mm, 0.0, z_mm) * 1e-3,
             axis: Some(Vector3::z()),
             size: None,
@@ -266,7 +266,7 @@ mod tests {
             plane(2, 0.0, 0.0),
         ];
         let top = SoughtFeature {
-            kind: Kind::Plane,
+            kind: FeatureKind::Plane,
             size: None,
             ..sought(5.0, 12.1, 0.0)
         };

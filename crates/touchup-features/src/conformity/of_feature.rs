@@ -32,19 +32,19 @@ mod tests {
     use nalgebra::Vector3;
 
     use super::*;
-    use crate::features::{Kind, Measured};
+    use crate::features::{FeatureKind, MeasuredValue};
 
     #[test]
     fn sizes_and_coordinates_are_those_of_the_feature() {
-        let number = |value, std| Measured::new(value, Some(std), Vec::new());
+        let number = |value, std| MeasuredValue::new(value, Some(std), Vec::new());
         let hole = Feature {
-            kind: Kind::Hole,
-            centre: Measured {
+            kind: FeatureKind::Hole,
+            centre: MeasuredValue {
                 value: Point3::new(3.0, 4.0, 9.0),
                 std: Some(0.2),
-                ..Measured::default()
+                ..MeasuredValue::default()
             },
-            axis: Some(Measured::new(Vector3::z(), Some(1e-3), Vec::new())),
+            axis: Some(MeasuredValue::new(Vector3::z(), Some(1e-3), Vec::new())),
             diameter: Some(number(8.0, 0.1)),
             ..Feature::default()
         };

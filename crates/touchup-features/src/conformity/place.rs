@@ -3,7 +3,7 @@
 use nalgebra::{Point3, Vector3};
 
 use super::assess::MeasuredNumber;
-use crate::features::{InspectedQuantity, Kind, Measured};
+use crate::features::{FeatureKind, InspectedQuantity, MeasuredValue};
 
 /// Cosine of 5°: a direction within that counts as along or square to an axis, as in relations of
 /// features.
@@ -15,8 +15,8 @@ const SQUARE: f64 = 0.087_155_742_747_658_17;
 /// axis or nominal centre. Centre, nominal centre and number are in one unit.
 pub fn place_number(
     quantity: InspectedQuantity,
-    kind: Kind,
-    centre: &Measured<Point3<f64>>,
+    kind: FeatureKind,
+    centre: &MeasuredValue<Point3<f64>>,
     axis: Option<Vector3<f64>>,
     nominal: Option<&Point3<f64>>,
 ) -> Option<MeasuredNumber> {
@@ -49,15 +49,15 @@ pub fn place_number(
 /// - `direction`: unit vector.
 /// - returns: `None` if the uncertainty of the centre does not cover that direction.
 fn coordinate_std(
-    kind: Kind,
+    kind: FeatureKind,
     axis: Option<Vector3<f64>>,
     std: f64,
     direction: &Vector3<f64>,
 ) -> Option<f64> {
     let along = axis.map(|axis| axis.dot(direction).abs());
     match (kind, along) {
-        (Kind::Corner, _) => Some(std / 3f64.sqrt()),
-        (Kind::Plane, Some(along)) => (along >= ALONG).then_some(std),
+        (FeatureKind::Corner, _) => Some(std / 3f64.sqrt()),
+        (FeatureKind::Plane, Some(along)) => (along >= ALONG).then_some(std),
         (_, Some(along)) => (along <= SQUARE).then_some(std / 2f64.sqrt()),
         (_, None) => None,
     }
@@ -70,14 +70,14 @@ fn coordinate_std(
 /// - `centre`, `nominal`: in one unit, which the result has too; `std` of the centre as well.
 /// - returns: `None` without an axis to measure across.
 fn position(
-    kind: Kind,
+    kind: FeatureKind,
     centre: &Point3<f64>,
     axis: Option<Vector3<f64>>,
     std: Option<f64>,
     nominal: &Point3<f64>,
 ) -> Option<MeasuredNumber> {
     let off = centre - nominal;
-    if matches!(kind, Kind::Plane | Kind::Corner) {
+    if matches!(kind, FeatureKind::Plane | FeatureKind::Corner) {
         return None;
     }
     let distance = off.cross(&axis?).norm();
@@ -97,21 +97,24 @@ mod tests {
     fn two_coordinates_share_what_is_known_of_an_axis() {
         let z = Some(Vector3::z());
         assert_eq!(
-            coordinate_std(Kind::Hole, z, 0.02, &Vector3::x()),
+            coordinate_std(FeatureKind::Hole, z, 0.02, &Vector3::x()),
             Some(0.02 / 2f64.sqrt())
         );
         assert_eq!(
-            coordinate_std(Kind::Hole, z, 0.02, &Vector3::z()),
+            coordinate_std(FeatureKind::Hole, z, 0.02, &Vector3::z()),
             None,
             "along the axis nothing is known"
         );
         assert_eq!(
-            coordinate_std(Kind::Plane, z, 0.02, &Vector3::z()),
+            coordinate_std(FeatureKind::Plane, z, 0.02, &Vector3::z()),
             Some(0.02)
         );
-        assert_eq!(coordinate_std(Kind::Plane, z, 0.02, &Vector3::x()), None);
         assert_eq!(
-            coordinate_std(Kind::Corner, None, 0.03, &Vector3::x()),
+            coordinate_std(FeatureKind::Plane, z, 0.02, &Vector3::x()),
+            None
+        );
+        assert_eq!(
+            coordinate_std(FeatureKind::Corner, None, 0.03, &Vector3::x()),
             Some(0.03 / 3f64.sqrt())
         );
     }
@@ -120,11 +123,18 @@ mod tests {
     #[test]
     fn position_is_twice_the_distance_across_the_axis() {
         let (centre, nominal) = (Point3::new(13.0, 24.0, 7.0), Point3::new(10.0, 20.0, 0.0));
-        let found = position(Kind::Hole, &centre, Some(Vector3::z()), Some(0.1), &nominal).unwrap();
+        let found = position(
+            FeatureKind::Hole,
+            &centre,
+            Some(Vector3::z()),
+            Some(0.1),
+            &nominal,
+        )
+        .unwrap();
         assert_eq!(found.value, 10.0);
         assert!((found.std.unwrap() - 0.2 / 2f64.sqrt()).abs() < 1e-15);
         assert_eq!(
-            position(Kind::Hole, &centre, None, Some(0.1), &nominal),
+            position(FeatureKind::Hole, &centre, None, Some(0.1), &nominal),
             None
         );
     }

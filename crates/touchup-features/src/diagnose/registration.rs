@@ -31,12 +31,16 @@ const DAMPING: f64 = 1e-3;
 /// Minimum size of a motion in its standard uncertainties.
 const CLEAR_ERRORS: f64 = 3.0;
 
-type Row = SVector<f64, NUMBERS>;
+/// Shift, turn and radius as one vector.
+type RegistrationUnknowns = SVector<f64, NUMBERS>;
 
 /// The motion, and its variation along the normals: root mean square about its mean, m.
 ///
 /// - `all`: equations of all places; `some`: of the fitted places.
-fn motion(all: &NormalEquations<NUMBERS>, some: NormalEquations<NUMBERS>) -> Option<(Row, f64)> {
+fn motion(
+    all: &NormalEquations<NUMBERS>,
+    some: NormalEquations<NUMBERS>,
+) -> Option<(RegistrationUnknowns, f64)> {
     let found = some.damped(DAMPING).solution()?;
     let mut moved = found;
     moved[6] = 0.0;
@@ -65,7 +69,7 @@ impl InputJudge<'_> {
             let arm = press.centre.coords - middle;
             point_to_plane_row(&arm, &press.normal, 1.0).push(1.0)
         };
-        let rows: Vec<(Row, f64)> = straight
+        let rows: Vec<(RegistrationUnknowns, f64)> = straight
             .iter()
             .map(|press| (row(press), radius - press.distance))
             .collect();

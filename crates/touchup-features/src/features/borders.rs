@@ -11,7 +11,7 @@ use nalgebra::Point3;
 use super::facets::NONE;
 use super::fit::Plane;
 use super::primitive::Primitive;
-use super::scene::Parted;
+use super::scene::SegmentedMesh;
 use touchup_geometry::numeric::distinct;
 
 /// A straight edge between two planes.
@@ -40,7 +40,7 @@ const GAP: f64 = 0.005;
 const SHORTEST: f64 = 0.02;
 
 /// The segment of each face, with the faces of the seams.
-pub(super) fn without_seams(parted: &Parted) -> Vec<u32> {
+pub(super) fn without_seams(parted: &SegmentedMesh) -> Vec<u32> {
     let is_strong: Vec<bool> = (0..parted.segmentation.segments.len())
         .map(|number| parted.is_strong(number))
         .collect();
@@ -84,7 +84,7 @@ pub(super) struct Border {
 /// The mesh edges between each two segments, the smaller number first.
 pub(super) type Borders = BTreeMap<[u32; 2], Vec<Border>>;
 
-pub(super) fn borders(parted: &Parted, of_face: &[u32]) -> Borders {
+pub(super) fn borders(parted: &SegmentedMesh, of_face: &[u32]) -> Borders {
     let mut borders = Borders::new();
     for face in 0..of_face.len() as u32 {
         let label = of_face[face as usize];
@@ -103,14 +103,18 @@ pub(super) fn borders(parted: &Parted, of_face: &[u32]) -> Borders {
 }
 
 /// All straight edges, in order of their planes.
-pub(super) fn straight_edges(parted: &Parted, borders: &Borders) -> Vec<StraightEdge> {
+pub(super) fn straight_edges(parted: &SegmentedMesh, borders: &Borders) -> Vec<StraightEdge> {
     borders
         .iter()
         .flat_map(|(&[i, j], border)| edges_between(parted, [i as usize, j as usize], border))
         .collect()
 }
 
-fn edges_between(parted: &Parted, planes: [usize; 2], border: &[Border]) -> Vec<StraightEdge> {
+fn edges_between(
+    parted: &SegmentedMesh,
+    planes: [usize; 2],
+    border: &[Border],
+) -> Vec<StraightEdge> {
     let segments = planes.map(|number| parted.segment(number));
     let Some((one, other)) = parted.plane(planes[0]).zip(parted.plane(planes[1])) else {
         return Vec::new();
@@ -156,7 +160,7 @@ fn edges_between(parted: &Parted, planes: [usize; 2], border: &[Border]) -> Vec<
 }
 
 /// Whether each of two segments falls away from the other at their border.
-pub(super) fn is_convex(parted: &Parted, border: &[Border], numbers: [usize; 2]) -> bool {
+pub(super) fn is_convex(parted: &SegmentedMesh, border: &[Border], numbers: [usize; 2]) -> bool {
     let surfaces = numbers.map(|number| &parted.segment(number).primitive);
     let height = |face: u32, surface: &Primitive| {
         parted

@@ -8,9 +8,9 @@ use std::collections::BTreeSet;
 use nalgebra::{Point3, Vector2, Vector3};
 
 use super::facets::NONE;
-use super::fit::{Cone, Surface};
+use super::fit::{Cone, SurfaceModel};
 use super::primitive::{Primitive, belongs, refined};
-use super::scene::Parted;
+use super::scene::SegmentedMesh;
 use super::segment::Segment;
 use super::walls::Wall;
 use touchup_geometry::numeric::{distinct, flood, median, tangent_basis};
@@ -40,7 +40,7 @@ const FIRST_SLACK: f64 = 0.05;
 const COVERAGE: f64 = 0.6;
 
 /// Adds the cones at both ends of each hole's wall to the segmentation and to the walls.
-pub(super) fn add_cones(parted: &mut Parted, walls: &mut Vec<Wall>) {
+pub(super) fn add_cones(parted: &mut SegmentedMesh, walls: &mut Vec<Wall>) {
     walls.retain(|wall| !wall.is_cone());
     let holes: Vec<Wall> = walls
         .iter()
@@ -73,7 +73,7 @@ pub(super) fn add_cones(parted: &mut Parted, walls: &mut Vec<Wall>) {
     }
 }
 
-fn cone_beyond(parted: &Parted, wall: &Wall, end: f64, out: f64) -> Option<Segment> {
+fn cone_beyond(parted: &SegmentedMesh, wall: &Wall, end: f64, out: f64) -> Option<Segment> {
     let radius = wall.radius();
     let of_hole = parted.segment(wall.segments[0]);
     let (tolerance, is_exact) = (of_hole.tolerance.max(SLACK * radius), of_hole.is_exact);
@@ -105,7 +105,7 @@ fn cone_beyond(parted: &Parted, wall: &Wall, end: f64, out: f64) -> Option<Segme
 }
 
 /// Faces on a ring around the axis, with normals towards it.
-fn ring(parted: &Parted, wall: &Wall, t: f64, radius: f64) -> Vec<u32> {
+fn ring(parted: &SegmentedMesh, wall: &Wall, t: f64, radius: f64) -> Vec<u32> {
     let [e, g] = tangent_basis(&wall.axis);
     let around = parted.around(wall.segments[0]);
     distinct((0..AROUND).filter_map(|i| {
@@ -118,7 +118,7 @@ fn ring(parted: &Parted, wall: &Wall, t: f64, radius: f64) -> Vec<u32> {
 }
 
 /// The cone about the axis of the wall through most faces of a ring.
-fn cone_of(parted: &Parted, wall: &Wall, faces: &[u32], out: f64) -> Option<Primitive> {
+fn cone_of(parted: &SegmentedMesh, wall: &Wall, faces: &[u32], out: f64) -> Option<Primitive> {
     let along = |face: u32| parted.facets.normal(face).dot(&wall.axis) * out;
     let sine = median(&mut faces.iter().map(|&face| along(face)).collect::<Vec<_>>())?;
     let is_alike = |face: u32| (along(face) - sine).abs() < ALIKE;
@@ -157,7 +157,7 @@ fn cone_from(apex: Point3<f64>, axis: &Vector3<f64>, half_angle: f64, wall: &Wal
 /// The cone about the axis of the wall through the corners of faces: on a coarse cone they are
 /// exact, its facets are not.
 fn through_corners(
-    parted: &Parted,
+    parted: &SegmentedMesh,
     wall: &Wall,
     faces: &[u32],
     start: &Primitive,
@@ -198,7 +198,12 @@ fn is_along(cone: &Primitive, wall: &Wall) -> bool {
 }
 
 /// Faces on the cone, connected with `seeds`, without planes and round walls.
-fn faces_on(parted: &Parted, mut seeds: Vec<u32>, cone: &Primitive, tolerance: f64) -> Vec<u32> {
+fn faces_on(
+    parted: &SegmentedMesh,
+    mut seeds: Vec<u32>,
+    cone: &Primitive,
+    tolerance: f64,
+) -> Vec<u32> {
     let facets = &parted.facets;
     let is_on = |face: u32| belongs(facets, face, cone, tolerance);
     seeds.retain(|&face| is_on(face));

@@ -7,10 +7,10 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::feature::{Feature, FittedTo, Kind};
+use super::feature::{Feature, FeatureKind, FittedTo};
 use super::fit::{Cylinder, FitParams, Observation, fit};
-use super::measure::{Fitted, Measure};
-use super::observe::Observed;
+use super::measure::{FittedSurface, Measure};
+use super::observe::SegmentTouches;
 use touchup_geometry::numeric::{median, tangent_basis};
 
 /// Widths of heads, in bores.
@@ -33,8 +33,8 @@ const DEPTHS: std::ops::Range<f64> = 0.25..3.0;
 const SQUARE: f64 = 0.9945;
 
 /// The head of a counterbored hole.
-pub(super) struct Head {
-    pub wall: Fitted<Cylinder>,
+pub(super) struct Counterbore {
+    pub wall: FittedSurface<Cylinder>,
     /// numbers of the touches on its floor
     pub floor: Vec<u32>,
     /// number of the plane around its opening
@@ -47,7 +47,7 @@ pub(super) struct Head {
 
 /// A contact seen from the axis of a bore.
 #[derive(Clone, Copy)]
-struct Seen {
+struct BoreContact {
     touch: u32,
     /// height of the centre along the axis, m
     z: f64,
@@ -61,13 +61,13 @@ struct Seen {
 }
 
 /// The head around a touched bore, above its floor; `None` if contacts show none.
-pub(super) fn head_of(measure: &Measure, bore: &Feature) -> Option<Head> {
+pub(super) fn head_of(measure: &Measure, bore: &Feature) -> Option<Counterbore> {
     let observed = measure.observed;
     let (axis, narrow) = (
         bore.axis.as_ref()?.value,
         bore.diameter.as_ref()?.value / 2.0,
     );
-    if bore.kind != Kind::Hole || bore.fitted_to != FittedTo::Touches {
+    if bore.kind != FeatureKind::Hole || bore.fitted_to != FittedTo::Touches {
         return None;
     }
     [axis, -axis]
@@ -76,11 +76,11 @@ pub(super) fn head_of(measure: &Measure, bore: &Feature) -> Option<Head> {
 }
 
 fn head_towards(
-    observed: &Observed,
+    observed: &SegmentTouches,
     on_axis: &Point3<f64>,
     out: &Vector3<f64>,
     narrow: f64,
-) -> Option<Head> {
+) -> Option<Counterbore> {
     let radius = observed.reach();
     let seen = seen_from(observed, on_axis, out, narrow * HEADS.end);
     let parted = observed.parted;
@@ -105,11 +105,11 @@ fn head_towards(
 
 /// Contacts around an axis.
 fn seen_from(
-    observed: &Observed,
+    observed: &SegmentTouches,
     on_axis: &Point3<f64>,
     out: &Vector3<f64>,
     widest: f64,
-) -> Vec<Seen> {
+) -> Vec<BoreContact> {
     let [e, g] = tangent_basis(out);
     let seen = observed.sound().filter_map(|(touch, contact)| {
         let v = contact.centre - on_axis;
@@ -123,7 +123,7 @@ fn seen_from(
         } else {
             0.0
         };
-        (rho < widest).then_some(Seen {
+        (rho < widest).then_some(BoreContact {
             touch,
             z,
             rho,
@@ -136,7 +136,7 @@ fn seen_from(
 }
 
 /// Share of a turn with contacts.
-fn turn_of<'a>(of: impl Iterator<Item = &'a Seen>) -> f64 {
+fn turn_of<'a>(of: impl Iterator<Item = &'a BoreContact>) -> f64 {
     let mut parts = [false; PARTS];
     of.for_each(|one| parts[one.part] = true);
     parts.iter().filter(|part| **part).count() as f64 / PARTS as f64
@@ -148,20 +148,20 @@ fn turn_of<'a>(of: impl Iterator<Item = &'a Seen>) -> f64 {
 ///   number
 #[expect(clippy::too_many_lines)]
 fn head_under(
-    observed: &Observed,
-    seen: &[Seen],
+    observed: &SegmentTouches,
+    seen: &[BoreContact],
     on_axis: &Point3<f64>,
     out: &Vector3<f64>,
     (narrow, level, land): (f64, f64, usize),
-) -> Option<Head> {
+) -> Option<Counterbore> {
     let radius = observed.reach();
     // distance of the ball's centre from the wall or its edge
-    let away = |one: &Seen| {
+    let away = |one: &BoreContact| {
         let above = (one.z - level).max(0.0);
         (above < radius).then(|| (radius * radius - above * above).sqrt())
     };
-    let is_beside = |one: &&Seen| one.inward > LEAN && one.z > level - DEPTHS.end * radius;
-    let walls: Vec<(f64, f64, &Seen)> = seen
+    let is_beside = |one: &&BoreContact| one.inward > LEAN && one.z > level - DEPTHS.end * radius;
+    let walls: Vec<(f64, f64, &BoreContact)> = seen
         .iter()
         .filter(is_beside)
         .filter_map(|one| Some((one.rho + away(one)?, away(one)?, one)))
@@ -192,16 +192,16 @@ fn head_under(
     })?;
     let wide = median(&mut on(wide).map(|(other, ..)| *other).collect::<Vec<_>>())?;
     // the floor between both
-    let is_floor = |one: &&Seen| {
+    let is_floor = |one: &&BoreContact| {
         one.up > LEVEL && one.rho < wide && one.z < level + radius * (1.0 - DEPTHS.start)
     };
-    let of_floor: Vec<&Seen> = seen
+    let of_floor: Vec<&BoreContact> = seen
         .iter()
         .filter(is_floor)
         .filter(|one| one.rho > narrow - 0.5 * radius)
         .collect();
     let height = median(&mut of_floor.iter().map(|one| one.z).collect::<Vec<_>>())?;
-    let floor: Vec<&Seen> = of_floor
+    let floor: Vec<&BoreContact> = of_floor
         .into_iter()
         .filter(|one| (one.z - height).abs() < near)
         .collect();
@@ -212,7 +212,7 @@ fn head_under(
     {
         return None;
     }
-    let of_wall: Vec<&(f64, f64, &Seen)> =
+    let of_wall: Vec<&(f64, f64, &BoreContact)> =
         on(wide).filter(|(.., one)| one.z > height - near).collect();
     let numbers: Vec<u32> = of_wall.iter().map(|(.., one)| one.touch).collect();
     let observations: Vec<Observation> = observed
@@ -240,7 +240,7 @@ fn head_under(
         .map(|(touch, _)| touch)
         .collect();
     let surface = found.surface;
-    let wall = Fitted {
+    let wall = FittedSurface {
         surface,
         fit: Some(found),
         touches,
@@ -248,7 +248,7 @@ fn head_under(
         uneven: 0.0,
         is_confirmed: true,
     };
-    Some(Head {
+    Some(Counterbore {
         wall,
         floor: floor.into_iter().map(|one| one.touch).collect(),
         land,

@@ -10,10 +10,11 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
 use super::contacts::{
-    ALIKE, Projected, SQUARE, TOGETHER, axes, large_planes, projected, thinned, together_along,
+    ALIKE, ProjectedContact, SQUARE, TOGETHER, axes, large_planes, projected, thinned,
+    together_along,
 };
 use super::fit::Ends;
-use super::scene::Parted;
+use super::scene::SegmentedMesh;
 use super::slots::{LONG, LONG_BOX, SHALLOW, SQUARISH, Slot, WIDE};
 use touchup_geometry::numeric::{
     distinct, median, order_statistic, tangent_basis, without_repeats,
@@ -80,7 +81,7 @@ const FLOOR_OFF: f64 = 0.2;
 const FLOOR_RADII: f64 = 3.0;
 
 /// A straight wall, seen along an axis.
-struct Line {
+struct WallLine {
     /// ball centres on it, m
     centres: Vec<Point2<f64>>,
     touches: Vec<usize>,
@@ -94,7 +95,7 @@ struct Line {
 ///
 /// - `is_round`: by contact, whether it is on a wall that is round all around
 pub(super) fn contact_slots(
-    parted: &Parted,
+    parted: &SegmentedMesh,
     touches: &[ProbedPoint],
     is_round: &[bool],
 ) -> Vec<Slot> {
@@ -120,7 +121,7 @@ pub(super) fn contact_slots(
             radius,
         };
         let groups = together_along(touches, &upright, &axis, TOGETHER * radius);
-        let lines: Vec<Line> = groups
+        let lines: Vec<WallLine> = groups
             .iter()
             .flat_map(|members| view.lines(members))
             .collect();
@@ -142,7 +143,7 @@ pub(super) fn contact_slots(
 
 /// Contacts seen along an axis.
 struct AxisView<'a> {
-    parted: &'a Parted<'a>,
+    parted: &'a SegmentedMesh<'a>,
     touches: &'a [ProbedPoint],
     /// contacts in use
     kept: &'a [usize],
@@ -154,7 +155,7 @@ struct AxisView<'a> {
 }
 
 /// A contact in the frame of a slot: x along it, y across, z along the axis.
-struct Local {
+struct SlotContact {
     touch: usize,
     /// position of the ball's centre, m
     x: f64,
@@ -177,7 +178,7 @@ struct SlotEnd {
 
 impl AxisView<'_> {
     /// The straight walls of some contacts, the largest number of contacts first.
-    fn lines(&self, members: &[usize]) -> Vec<Line> {
+    fn lines(&self, members: &[usize]) -> Vec<WallLine> {
         let mut left = projected(self.touches, members, self.plane);
         let mut rng = Pcg64::seed_from_u64(SEED);
         let mut found = Vec::new();
@@ -212,7 +213,7 @@ impl AxisView<'_> {
     }
 
     /// Normal of a possible wall through two contacts.
-    fn through(&self, p: &Projected, q: &Projected) -> Option<Vector2<f64>> {
+    fn through(&self, p: &ProjectedContact, q: &ProjectedContact) -> Option<Vector2<f64>> {
         let apart = q.at - p.at;
         let length = apart.norm();
         if length < LEAST_RADII * self.radius || p.normal.dot(&q.normal) < ALIKE {
@@ -223,21 +224,21 @@ impl AxisView<'_> {
         (normal.dot(&p.normal) > ALIKE && normal.dot(&q.normal) > ALIKE).then_some(normal)
     }
 
-    fn is_on_line(&self, one: &Projected, at: &Point2<f64>, normal: &Vector2<f64>) -> bool {
+    fn is_on_line(&self, one: &ProjectedContact, at: &Point2<f64>, normal: &Vector2<f64>) -> bool {
         (one.at - at).dot(normal).abs() < SEARCHED * self.radius && one.normal.dot(normal) > ALIKE
     }
 
     /// The line through the longest connected run of contacts near a line; `None`: too few.
     fn fitted_line(
         &self,
-        all: &[Projected],
+        all: &[ProjectedContact],
         mut at: Point2<f64>,
         mut normal: Vector2<f64>,
-    ) -> Option<Line> {
+    ) -> Option<WallLine> {
         let mut line = None;
         for _ in 0..3 {
             let along = Vector2::new(normal.y, -normal.x);
-            let mut on: Vec<(f64, &Projected)> = all
+            let mut on: Vec<(f64, &ProjectedContact)> = all
                 .iter()
                 .filter(|one| self.is_on_line(one, &at, &normal))
                 .map(|one| ((one.at - at).dot(&along), one))
@@ -265,7 +266,7 @@ impl AxisView<'_> {
             let turned = normal - along * (xy / xx);
             (at, normal) = (Point2::from(middle), turned.normalize());
             let centres = run.iter().map(|(_, one)| one.at).collect();
-            line = Some(Line {
+            line = Some(WallLine {
                 centres,
                 touches: run.iter().map(|(_, one)| one.touch).collect(),
                 at,
@@ -276,14 +277,14 @@ impl AxisView<'_> {
     }
 
     /// The void between two facing walls, with the share of them next to its land.
-    fn between(&self, one: &Line, other: &Line) -> Option<(Slot, f64)> {
+    fn between(&self, one: &WallLine, other: &WallLine) -> Option<(Slot, f64)> {
         let across = (one.normal - other.normal).try_normalize(0.0)?;
         let gap = (other.at - one.at).dot(&across);
         if one.normal.dot(&other.normal) > -PARALLEL || gap < 0.0 {
             return None;
         }
         let along = Vector2::new(across.y, -across.x);
-        let span = |line: &Line| {
+        let span = |line: &WallLine| {
             let x = line.centres.iter().map(|p| (p - one.at).dot(&along));
             x.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| {
                 [low.min(x), high.max(x)]
@@ -356,7 +357,7 @@ impl Void<'_> {
     }
 
     /// The contacts in the void or around its ends.
-    fn contacts(&self, among: impl Iterator<Item = usize>) -> Vec<Local> {
+    fn contacts(&self, among: impl Iterator<Item = usize>) -> Vec<SlotContact> {
         let (r, w) = (self.view.radius, self.width());
         let local = |touch: usize| {
             let contact = &self.view.touches[touch];
@@ -373,7 +374,7 @@ impl Void<'_> {
             let is_beside = x > self.reach[0] - w
                 && x < self.reach[1] + w
                 && y.abs() < self.gap / 2.0 + 0.3 * r;
-            (is_beside && !contact.is_rejected).then_some(Local {
+            (is_beside && !contact.is_rejected).then_some(SlotContact {
                 touch,
                 x,
                 y,
@@ -387,19 +388,19 @@ impl Void<'_> {
     }
 
     /// End of the slot on one side, by the contacts that lean back from there.
-    fn end(&self, contacts: &[Local], sign: f64) -> Option<SlotEnd> {
+    fn end(&self, contacts: &[SlotContact], sign: f64) -> Option<SlotEnd> {
         let (r, half) = (self.view.radius, self.gap / 2.0);
-        let is_of = |one: &&Local| {
+        let is_of = |one: &&SlotContact| {
             let is_level = one.z.abs() < self.half_height + r && one.normal.z.abs() < SQUARE;
             is_level && one.normal.x * sign < -END_LEAN && one.x * sign > self.felt - half.max(r)
         };
-        let of_end: Vec<&Local> = contacts.iter().filter(is_of).collect();
+        let of_end: Vec<&SlotContact> = contacts.iter().filter(is_of).collect();
         // another slot may end beyond: the nearest counts
         let nearest = of_end
             .iter()
             .map(|one| one.x * sign)
             .fold(f64::INFINITY, f64::min);
-        let of_end: Vec<&Local> = of_end
+        let of_end: Vec<&SlotContact> = of_end
             .into_iter()
             .filter(|one| one.x * sign < nearest + half.max(0.5 * r))
             .collect();
@@ -408,13 +409,13 @@ impl Void<'_> {
         }
         let half_width = self.width() / 2.0;
         // contacts and not centres: a ball that fills the end hardly moves in it
-        let from_axis = |one: &Local| {
+        let from_axis = |one: &SlotContact| {
             (half_width * half_width - one.contact_y.powi(2))
                 .max(0.0)
                 .sqrt()
         };
-        let axis_at = |one: &Local| one.contact_x * sign - from_axis(one);
-        let middle_of = |place: &dyn Fn(&Local) -> f64| {
+        let axis_at = |one: &SlotContact| one.contact_x * sign - from_axis(one);
+        let middle_of = |place: &dyn Fn(&SlotContact) -> f64| {
             median(&mut of_end.iter().map(|one| place(one)).collect::<Vec<_>>())
         };
         let (round, flat) = (
@@ -482,8 +483,9 @@ impl Void<'_> {
             &out,
             [low, high],
         );
-        let is_reached =
-            |end: &Land| floor.is_none() && end.distance < self.half_height + self.view.radius;
+        let is_reached = |end: &SurroundingSurface| {
+            floor.is_none() && end.distance < self.half_height + self.view.radius
+        };
         let opposite = openings[1 - out_at].filter(is_reached);
         let lowest = opposite.map_or(self.half_height, |end| end.distance);
         let down = floor.as_ref().map_or(lowest, |(_, distance)| *distance);
@@ -522,9 +524,9 @@ impl Void<'_> {
     }
 
     /// Whether an island stands between the walls.
-    fn has_island(&self, contacts: &[Local]) -> bool {
+    fn has_island(&self, contacts: &[SlotContact]) -> bool {
         let r = self.view.radius;
-        let is_between = |one: &&Local| {
+        let is_between = |one: &&SlotContact| {
             let is_inside = one.x.abs() < self.felt && one.y.abs() < self.gap / 2.0 - 0.5 * r;
             is_inside && one.z.abs() < self.half_height && one.normal.y.abs() > ISLAND_LEAN
         };
@@ -532,10 +534,10 @@ impl Void<'_> {
     }
 
     /// The plane, or the cylinder with the material inside, around the opening towards `out`.
-    fn land(&self, middle: &Point3<f64>, out: &Vector3<f64>) -> Option<Land> {
+    fn land(&self, middle: &Point3<f64>, out: &Vector3<f64>) -> Option<SurroundingSurface> {
         let (parted, r) = (self.view.parted, self.view.radius);
         let farthest = self.half_height + (2.0 * r).max(0.5 * self.width());
-        let mut best: Option<Land> = None;
+        let mut best: Option<SurroundingSurface> = None;
         for number in 0..parted.segmentation.segments.len() {
             let is_plane = parted
                 .plane(number)
@@ -574,7 +576,7 @@ impl Void<'_> {
             }
             let share = count as f64 / (2 * PLACES) as f64;
             if share > LAND_SHARE && best.is_none_or(|best| share > best.share) {
-                best = Some(Land {
+                best = Some(SurroundingSurface {
                     number,
                     distance,
                     share,
@@ -587,14 +589,14 @@ impl Void<'_> {
     /// The contacts on the floor, with its distance below the middle, m.
     fn floor(
         &self,
-        contacts: &[Local],
+        contacts: &[SlotContact],
         out: &Vector3<f64>,
         [low, high]: [f64; 2],
     ) -> Option<(Vec<u32>, f64)> {
         let r = self.view.radius;
         let side = -self.view.axis.dot(out).signum();
         let deepest = self.half_height + FLOOR_RADII * r;
-        let is_of = |one: &&Local| {
+        let is_of = |one: &&SlotContact| {
             let is_inside =
                 one.x > low && one.x < high && one.y.abs() < self.gap / 2.0 + SEARCHED * r;
             is_inside
@@ -602,7 +604,7 @@ impl Void<'_> {
                 && one.z * side > self.half_height - 0.5 * r
                 && one.z * side < deepest
         };
-        let of_floor: Vec<&Local> = contacts.iter().filter(is_of).collect();
+        let of_floor: Vec<&SlotContact> = contacts.iter().filter(is_of).collect();
         let level = median(&mut of_floor.iter().map(|one| one.z * side).collect::<Vec<_>>())?;
         let on = of_floor
             .iter()
@@ -614,7 +616,7 @@ impl Void<'_> {
 
 /// Surface around an opening.
 #[derive(Clone, Copy)]
-struct Land {
+struct SurroundingSurface {
     /// number of the segment
     number: usize,
     /// distance from the middle of the slot, m

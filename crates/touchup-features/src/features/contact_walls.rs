@@ -12,14 +12,14 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
 use super::contacts::{
-    ALIKE, LEAST, Projected, SQUARE, TOGETHER, axes, is_on, large_planes, projected, thinned,
-    together,
+    ALIKE, LEAST, ProjectedContact, SQUARE, TOGETHER, axes, is_on, large_planes, projected,
+    thinned, together,
 };
 use super::facets::NONE;
-use super::fit::{Cylinder, FitParams, Plane, Surface, fit};
+use super::fit::{Cylinder, FitParams, Plane, SurfaceModel, fit};
 use super::observe::{groups, observation};
 use super::primitive::{Primitive, belongs};
-use super::scene::Parted;
+use super::scene::SegmentedMesh;
 use super::segment::Segment;
 use super::walls::ALL_AROUND;
 use touchup_geometry::mesh::{BoxQuery, FaceId};
@@ -103,7 +103,7 @@ struct ContactWalls {
 
 /// Adds the walls that contacts show to the segmentation, each with the faces of the mesh on it.
 /// Returns for each contact whether it is on a wall that is round all around.
-pub(super) fn add_contact_walls(parted: &mut Parted, touches: &[ProbedPoint]) -> Vec<bool> {
+pub(super) fn add_contact_walls(parted: &mut SegmentedMesh, touches: &[ProbedPoint]) -> Vec<bool> {
     let radius = touches.iter().map(|touch| touch.radius).fold(0.0, f64::max);
     let ContactWalls { cylinders, planes } = contact_walls(parted, touches);
     let of_planes = planes.iter().map(|found| {
@@ -150,7 +150,7 @@ pub(super) fn add_contact_walls(parted: &mut Parted, touches: &[ProbedPoint]) ->
 
 /// Faces of the mesh's round pieces of the same wall, with its untouched rest: one wall is one
 /// feature.
-fn faces_of_same(parted: &Parted, found: &ContactCylinder, of_ball: f64) -> Vec<u32> {
+fn faces_of_same(parted: &SegmentedMesh, found: &ContactCylinder, of_ball: f64) -> Vec<u32> {
     let Cylinder {
         radius, concave, ..
     } = found.surface;
@@ -186,7 +186,7 @@ fn faces_of_same(parted: &Parted, found: &ContactCylinder, of_ball: f64) -> Vec<
 }
 
 /// Faces of the mesh on a plane beside the contacts on it.
-fn faces_by(parted: &Parted, found: &ContactPlane, touches: &[ProbedPoint]) -> Vec<u32> {
+fn faces_by(parted: &SegmentedMesh, found: &ContactPlane, touches: &[ProbedPoint]) -> Vec<u32> {
     let primitive = Primitive::Plane(found.surface);
     let mut query = BoxQuery::default();
     let mut faces = Vec::new();
@@ -222,7 +222,7 @@ fn faces_by(parted: &Parted, found: &ContactPlane, touches: &[ProbedPoint]) -> V
 }
 
 /// Faces of the mesh on a cylinder, within its touched length.
-fn faces_on(parted: &Parted, found: &ContactCylinder, radius: f64) -> Vec<u32> {
+fn faces_on(parted: &SegmentedMesh, found: &ContactCylinder, radius: f64) -> Vec<u32> {
     let Cylinder {
         radius: of_wall, ..
     } = found.surface;
@@ -317,7 +317,7 @@ impl ContactWalls {
 }
 
 /// All walls that contacts show, the largest number of contacts first.
-fn contact_walls(parted: &Parted, touches: &[ProbedPoint]) -> ContactWalls {
+fn contact_walls(parted: &SegmentedMesh, touches: &[ProbedPoint]) -> ContactWalls {
     let kept = thinned(touches);
     let Some(radius) = kept.first().map(|&at| touches[at].radius) else {
         return ContactWalls::default();
@@ -523,13 +523,13 @@ fn circles(
         ) {
             found.push((one, numbers.iter().map(|&number| number as usize).collect()));
         }
-        let is_on = |projected: &Projected| is_on_circle(projected, &centre, rho, radius);
+        let is_on = |projected: &ProjectedContact| is_on_circle(projected, &centre, rho, radius);
         left.retain(|projected| !is_on(projected));
     }
     found
 }
 
-fn is_on_circle(one: &Projected, centre: &Point2<f64>, rho: f64, radius: f64) -> bool {
+fn is_on_circle(one: &ProjectedContact, centre: &Point2<f64>, rho: f64, radius: f64) -> bool {
     let v = centre - one.at;
     let distance = v.norm();
     (distance - rho.abs()).abs() < SEARCHED * radius
@@ -538,7 +538,7 @@ fn is_on_circle(one: &Projected, centre: &Point2<f64>, rho: f64, radius: f64) ->
 
 /// The circle of ball centres with the largest touched share of a turn: its centre and ρ, m, and
 /// that share; `None`: the share is too small.
-fn best_circle(all: &[Projected], radius: f64) -> Option<(Point2<f64>, f64, f64)> {
+fn best_circle(all: &[ProjectedContact], radius: f64) -> Option<(Point2<f64>, f64, f64)> {
     let mut best: Option<(usize, usize, Point2<f64>, f64)> = None;
     // the same contacts give the same circles
     let mut rng = Pcg64::seed_from_u64(SEED);
@@ -577,7 +577,7 @@ fn best_circle(all: &[Projected], radius: f64) -> Option<(Point2<f64>, f64, f64)
 }
 
 /// The circle by the centres and normals of two contacts: p + ρ m = q + ρ n, by least squares.
-fn circle_of_two(one: &Projected, other: &Projected) -> Option<(Point2<f64>, f64)> {
+fn circle_of_two(one: &ProjectedContact, other: &ProjectedContact) -> Option<(Point2<f64>, f64)> {
     let (apart, turned) = (one.at - other.at, one.normal - other.normal);
     if turned.norm_squared() < TURNED {
         return None;
@@ -593,7 +593,7 @@ fn circle_of_two(one: &Projected, other: &Projected) -> Option<(Point2<f64>, f64
 }
 
 /// The circle through three centres; its sign is from the first normal.
-fn circle_of_three([one, other, third]: [&Projected; 3]) -> Option<(Point2<f64>, f64)> {
+fn circle_of_three([one, other, third]: [&ProjectedContact; 3]) -> Option<(Point2<f64>, f64)> {
     let (a, b) = (other.at - one.at, third.at - one.at);
     let twice_area = a.perp(&b);
     if twice_area.abs() < BENT * a.norm() * b.norm() {
@@ -610,7 +610,12 @@ fn circle_of_three([one, other, third]: [&Projected; 3]) -> Option<(Point2<f64>,
 }
 
 /// Number of contacts on a circle, and of touched parts of a turn.
-fn support(all: &[Projected], centre: &Point2<f64>, rho: f64, radius: f64) -> (usize, usize) {
+fn support(
+    all: &[ProjectedContact],
+    centre: &Point2<f64>,
+    rho: f64,
+    radius: f64,
+) -> (usize, usize) {
     let (mut parts, mut count) = ([false; PARTS], 0);
     for one in all
         .iter()
@@ -626,7 +631,7 @@ fn support(all: &[Projected], centre: &Point2<f64>, rho: f64, radius: f64) -> (u
 
 /// The circle of least squares through the contacts on one: x² + y² = 2 a x + 2 b y + c.
 fn fitted_circle(
-    all: &[Projected],
+    all: &[ProjectedContact],
     centre: Point2<f64>,
     rho: f64,
     radius: f64,

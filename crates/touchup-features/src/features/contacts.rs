@@ -5,8 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Matrix3, Point2, Point3, Vector2, Vector3};
 
-use super::fit::Surface;
-use super::scene::Parted;
+use super::fit::SurfaceModel;
+use super::scene::SegmentedMesh;
 use touchup_geometry::numeric::{DisjointSets, PointGrid, VoxelKey, spreads, voxel_of};
 use touchup_method::stylus::ProbedPoint;
 
@@ -30,7 +30,7 @@ const MOST_AXES: usize = 12;
 pub(super) const LEAST: usize = 12;
 
 /// A contact seen along an axis.
-pub(super) struct Projected {
+pub(super) struct ProjectedContact {
     pub touch: usize,
     /// centre of the ball, m
     pub at: Point2<f64>,
@@ -45,11 +45,11 @@ pub(super) fn projected(
     touches: &[ProbedPoint],
     members: &[usize],
     [e, g]: [Vector3<f64>; 2],
-) -> Vec<Projected> {
+) -> Vec<ProjectedContact> {
     let project = |&touch: &usize| {
         let (p, n) = (touches[touch].centre.coords, touches[touch].normal);
         let normal = Vector2::new(n.dot(&e), n.dot(&g)).try_normalize(0.0)?;
-        Some(Projected {
+        Some(ProjectedContact {
             touch,
             at: Point2::new(p.dot(&e), p.dot(&g)),
             normal,
@@ -69,7 +69,7 @@ pub(super) fn thinned(touches: &[ProbedPoint]) -> Vec<usize> {
 }
 
 /// Numbers of the planes under possible holes, the largest first.
-pub(super) fn large_planes(parted: &Parted) -> Vec<usize> {
+pub(super) fn large_planes(parted: &SegmentedMesh) -> Vec<usize> {
     let mut numbers: Vec<usize> = parted
         .planes()
         .map(|(number, ..)| number)
@@ -80,7 +80,7 @@ pub(super) fn large_planes(parted: &Parted) -> Vec<usize> {
 }
 
 /// Whether a contact is on the plane of a segment.
-pub(super) fn is_on(parted: &Parted, number: usize, touch: &ProbedPoint) -> bool {
+pub(super) fn is_on(parted: &SegmentedMesh, number: usize, touch: &ProbedPoint) -> bool {
     let Some(plane) = parted.plane(number) else {
         return false;
     };
@@ -91,7 +91,7 @@ pub(super) fn is_on(parted: &Parted, number: usize, touch: &ProbedPoint) -> bool
 
 /// Candidate directions of axes.
 pub(super) fn axes(
-    parted: &Parted,
+    parted: &SegmentedMesh,
     planes: &[usize],
     touches: &[ProbedPoint],
     free: &[usize],

@@ -285,7 +285,7 @@ impl CornerSums {
 
     #[inline]
     fn add(&mut self, corners: &Corners, i: usize) {
-        let vector = |v: &[Two; 3]| Vector3::new(v[0][i], v[1][i], v[2][i]);
+        let vector = |v: &[F64x2; 3]| Vector3::new(v[0][i], v[1][i], v[2][i]);
         self.turn(corners.cos[i] * self.scale, corners.sin[i] * self.scale);
         self.area += corners.area[i];
         self.double_area_normal += vector(&corners.normal);
@@ -350,20 +350,20 @@ fn argument(re: f64, im: f64) -> f64 {
 }
 
 /// Two numbers, for operations on both at once.
-type Two = [f64; 2];
+type F64x2 = [f64; 2];
 
 #[inline]
-fn two(of: impl Fn(usize) -> f64) -> Two {
+fn two(of: impl Fn(usize) -> f64) -> F64x2 {
     [of(0), of(1)]
 }
 
 /// Quantities at one corner of each of two faces: one wide instruction does the same sum for both.
 struct Corners {
-    cos: Two,
-    sin: Two,
-    area: Two,
-    normal: [Two; 3],
-    gradient: [Two; 3],
+    cos: F64x2,
+    sin: F64x2,
+    area: F64x2,
+    normal: [F64x2; 3],
+    gradient: [F64x2; 3],
 }
 
 impl Corners {
@@ -372,7 +372,7 @@ impl Corners {
     fn between(edges: [[Vector3<f64>; 2]; 2]) -> Self {
         let e = [0, 1, 2].map(|axis| two(|i| edges[i][0][axis]));
         let f = [0, 1, 2].map(|axis| two(|i| edges[i][1][axis]));
-        let dot = |a: &[Two; 3], b: &[Two; 3]| {
+        let dot = |a: &[F64x2; 3], b: &[F64x2; 3]| {
             two(|i| a[0][i] * b[0][i] + a[1][i] * b[1][i] + a[2][i] * b[2][i])
         };
         let normal =

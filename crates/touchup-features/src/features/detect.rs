@@ -4,16 +4,16 @@ use nalgebra::{Matrix3, Point3, Vector3};
 
 use super::borders::{StraightEdge, borders, straight_edges, without_seams};
 use super::cones::add_cones;
-use super::contact_heads::{Head, head_of};
+use super::contact_heads::{Counterbore, head_of};
 use super::contact_slots::contact_slots;
 use super::contact_walls::add_contact_walls;
-use super::feature::{Feature, FittedTo, Form, Kind, Measured, Walls};
-use super::fit::{Fit, Freedom, Plane, Stadium, Surface};
+use super::feature::{Feature, FeatureKind, FittedTo, Form, MeasuredValue, Walls};
+use super::fit::{Fit, Freedom, Plane, Stadium, SurfaceModel};
 use super::holes::{Boss, Hole, bosses, groups, holes};
-use super::measure::{Fitted, Measure};
-use super::observe::{NOT_ALIKE, Observed};
+use super::measure::{FittedSurface, Measure};
+use super::observe::{NOT_ALIKE, SegmentTouches};
 use super::rims::{OpeningOutline, RoundOpening, outlines, rims};
-use super::scene::{Parted, numbered_by_place};
+use super::scene::{SegmentedMesh, numbered_by_place};
 use super::shafts::is_shaft;
 use super::slots::{Slot, slots};
 use super::walls::{ALL_AROUND, SAME_WALL, Wall};
@@ -46,7 +46,7 @@ pub fn detect(mesh: &TriMesh, touches: &[ProbedPoint]) -> Detection {
     let numbered = (!touches.is_empty()).then(|| numbered_by_place(mesh));
     let mesh = numbered.as_ref().unwrap_or(mesh);
     let tree = FaceTree::new(mesh);
-    let mut parted = Parted::of(mesh, &tree);
+    let mut parted = SegmentedMesh::of(mesh, &tree);
     join_planes(&mut parted);
     let is_round = add_contact_walls(&mut parted, touches);
     // contact walls took faces from planes of the mesh; equal planes join again
@@ -84,7 +84,7 @@ pub fn detect(mesh: &TriMesh, touches: &[ProbedPoint]) -> Detection {
         .into_iter()
         .filter(|hole| !is_slot_end(&walls[hole.wall], &slots))
         .collect();
-    let observed = Observed::of(&parted, &of_face, touches);
+    let observed = SegmentTouches::of(&parted, &of_face, touches);
     let measure = Measure::new(&observed);
 
     // an untouched wall of the ball's own width is the path of the ball through an unscanned region
@@ -133,7 +133,7 @@ pub fn detect(mesh: &TriMesh, touches: &[ProbedPoint]) -> Detection {
     let flat: Vec<&Slot> = slots.iter().chain(&pockets).collect();
     let (raised, cut): (Vec<Feature>, Vec<Feature>) = of_other_outline(&measure, &round, &flat)
         .into_iter()
-        .partition(|feature| feature.kind == Kind::Boss);
+        .partition(|feature| feature.kind == FeatureKind::Boss);
     features.extend(cut);
     let mut features = with_heads(&measure, without_second_walls(features));
     let is_reported = |slot: &Slot, feature: &Feature| {
@@ -143,7 +143,7 @@ pub fn detect(mesh: &TriMesh, touches: &[ProbedPoint]) -> Detection {
     };
     let measured = slots
         .iter()
-        .map(|slot| (slot, slot_feature(&measure, slot, Kind::Slot)));
+        .map(|slot| (slot, slot_feature(&measure, slot, FeatureKind::Slot)));
     features.extend(
         measured
             .filter(|(slot, feature)| is_reported(slot, feature))
@@ -152,7 +152,7 @@ pub fn detect(mesh: &TriMesh, touches: &[ProbedPoint]) -> Detection {
     features.extend(
         pockets
             .iter()
-            .map(|pocket| slot_feature(&measure, pocket, Kind::Pocket)),
+            .map(|pocket| slot_feature(&measure, pocket, FeatureKind::Pocket)),
     );
     let raised = bosses
         .iter()
@@ -194,7 +194,7 @@ pub fn detect(mesh: &TriMesh, touches: &[ProbedPoint]) -> Detection {
 }
 
 /// Joins adjacent segments of one plane.
-fn join_planes(parted: &mut Parted) {
+fn join_planes(parted: &mut SegmentedMesh) {
     let beside: Vec<_> = borders(parted, &without_seams(parted))
         .into_keys()
         .collect();
@@ -233,10 +233,12 @@ fn is_same_head(known: &Feature, head: &Feature) -> bool {
     };
     let near = 0.5 * wide(head);
     let is_near = (known.centre.value - head.centre.value).norm() < near;
-    known.kind == Kind::Hole && is_near && (wide(known) - wide(head)).abs() < ONE_WALL * wide(head)
+    known.kind == FeatureKind::Hole
+        && is_near
+        && (wide(known) - wide(head)).abs() < ONE_WALL * wide(head)
 }
 
-fn head_feature(measure: &Measure, head: &Head) -> Feature {
+fn head_feature(measure: &Measure, head: &Counterbore) -> Feature {
     let axis = head.wall.axis(&head.out);
     let on_axis = head.wall.surface.center();
     let opening = AxisEnd::on(measure, Some(head.land), &on_axis, &axis.value);
@@ -255,7 +257,7 @@ fn head_feature(measure: &Measure, head: &Head) -> Feature {
         depth: Some(between(&opening, &floor, &axis.value)),
         axis: Some(axis),
         walls: Some(Walls::Round(head.wall.surface)),
-        ..Feature::new(Kind::Hole, centre, 1.0, FittedTo::Touches)
+        ..Feature::new(FeatureKind::Hole, centre, 1.0, FittedTo::Touches)
     }
 }
 
@@ -296,7 +298,7 @@ fn is_one_wall(one: &Feature, other_feature: &Feature) -> bool {
     // bottom or foot, axis, depth to the opening or top, diameter
     let wall = |feature: &Feature| {
         let (axis, depth) = (feature.axis.as_ref()?.value, feature.depth.as_ref()?.value);
-        let is_hole = matches!(feature.kind, Kind::Hole | Kind::Notch);
+        let is_hole = matches!(feature.kind, FeatureKind::Hole | FeatureKind::Notch);
         let bottom = feature.centre.value - axis * if is_hole { depth } else { 0.0 };
         (depth > 0.0).then_some((bottom, axis, depth, feature.diameter.as_ref()?.value))
     };
@@ -352,7 +354,7 @@ fn is_slot_end(wall: &Wall, slots: &[Slot]) -> bool {
 /// Maximum difference of width and place between a slot and its end wall, in widths.
 const ALIKE: f64 = 0.2;
 
-fn is_sure_plane(parted: &Parted, number: usize) -> bool {
+fn is_sure_plane(parted: &SegmentedMesh, number: usize) -> bool {
     let segment = parted.segment(number);
     segment.is_exact || segment.area > (SURE_WIDTH * segment.tolerance).powi(2)
 }
@@ -361,7 +363,7 @@ fn is_sure_plane(parted: &Parted, number: usize) -> bool {
 #[derive(Clone, Debug, Default)]
 struct AxisEnd {
     /// place, with its uncertainty along the axis
-    place: Measured<Point3<f64>>,
+    place: MeasuredValue<Point3<f64>>,
     /// standard deviation along the axis without the common error of all touches, m
     own_std: Option<f64>,
     /// common error of its touches along the axis, m
@@ -369,7 +371,7 @@ struct AxisEnd {
 }
 
 /// Distance between two parallel ends along `direction`, with its uncertainty.
-fn between(from: &AxisEnd, to: &AxisEnd, direction: &Vector3<f64>) -> Measured<f64> {
+fn between(from: &AxisEnd, to: &AxisEnd, direction: &Vector3<f64>) -> MeasuredValue<f64> {
     // touched from one side, both ends share most of the common error of touches
     let common = NOT_ALIKE * from.systematic.hypot(to.systematic);
     let std = from
@@ -377,7 +379,7 @@ fn between(from: &AxisEnd, to: &AxisEnd, direction: &Vector3<f64>) -> Measured<f
         .zip(to.own_std)
         .map(|(a, b)| a.hypot(b).hypot(common));
     let touches = distinct(from.place.touches.iter().chain(&to.place.touches).copied());
-    Measured::new(
+    MeasuredValue::new(
         (from.place.value - to.place.value).dot(direction).abs(),
         std,
         touches,
@@ -392,11 +394,11 @@ const LEAN_SIGMAS: f64 = 3.0;
 /// distance is then the touched extent of the wall, a lower bound.
 fn extent<S>(
     measure: &Measure,
-    fitted: &Fitted<S>,
+    fitted: &FittedSurface<S>,
     from: &AxisEnd,
     to: &AxisEnd,
     out: &Vector3<f64>,
-) -> Measured<f64> {
+) -> MeasuredValue<f64> {
     let is_felt = [from, to].map(|end| !end.place.touches.is_empty());
     if fitted.to == FittedTo::Mesh || is_felt == [true; 2] {
         return between(from, to, out);
@@ -425,11 +427,11 @@ fn extent<S>(
     } else {
         highest - beyond
     };
-    Measured {
+    MeasuredValue {
         value: (end - begin).max(0.0),
         touches: fitted.touches.clone(),
         is_at_least: true,
-        ..Measured::default()
+        ..MeasuredValue::default()
     }
 }
 
@@ -461,7 +463,7 @@ impl AxisEnd {
     /// Intersection of the axis with a touched plane; else `point`.
     fn met(
         measure: &Measure,
-        plane: &Fitted<Plane>,
+        plane: &FittedSurface<Plane>,
         point: &Point3<f64>,
         axis: &Vector3<f64>,
     ) -> Self {
@@ -472,7 +474,7 @@ impl AxisEnd {
         )
     }
 
-    fn at(measure: &Measure, place: Measured<Point3<f64>>, own_std: Option<f64>) -> Self {
+    fn at(measure: &Measure, place: MeasuredValue<Point3<f64>>, own_std: Option<f64>) -> Self {
         let [common, shift] = measure.observed.systematic(&place.touches);
         Self {
             place,
@@ -483,9 +485,9 @@ impl AxisEnd {
 
     fn unknown(point: &Point3<f64>) -> Self {
         Self {
-            place: Measured {
+            place: MeasuredValue {
                 value: *point,
-                ..Measured::default()
+                ..MeasuredValue::default()
             },
             ..Self::default()
         }
@@ -494,13 +496,13 @@ impl AxisEnd {
     /// Centre of a feature with a fitted surface, at this end.
     ///
     /// - `std`: standard deviation of the centre, from the fit, m.
-    fn centre<S: Surface>(
+    fn centre<S: SurfaceModel>(
         &self,
-        fitted: &Fitted<S>,
+        fitted: &FittedSurface<S>,
         std: impl Fn(&Fit<S>) -> Option<f64>,
-    ) -> Measured<Point3<f64>> {
+    ) -> MeasuredValue<Point3<f64>> {
         let touches = distinct(fitted.touches.iter().chain(&self.place.touches).copied());
-        Measured::new(self.place.value, fitted.confirmed().and_then(std), touches)
+        MeasuredValue::new(self.place.value, fitted.confirmed().and_then(std), touches)
     }
 }
 
@@ -546,7 +548,11 @@ fn hole_feature(measure: &Measure, walls: &[Wall], hole: &Hole) -> Feature {
             )
         }),
         ..Feature::new(
-            if is_notch { Kind::Notch } else { Kind::Hole },
+            if is_notch {
+                FeatureKind::Notch
+            } else {
+                FeatureKind::Hole
+            },
             centre,
             touched,
             fitted.to,
@@ -572,7 +578,7 @@ fn rim_feature(measure: &Measure, rim: &RoundOpening) -> Feature {
         Some(rim.fit.clone()),
         !measure.observed.has_touches(),
     );
-    let fitted = Fitted {
+    let fitted = FittedSurface {
         surface,
         fit,
         touches: Vec::new(),
@@ -583,12 +589,12 @@ fn rim_feature(measure: &Measure, rim: &RoundOpening) -> Feature {
     let std = fitted
         .confirmed()
         .and_then(|fit| fit.lateral_std(&rim.centre));
-    let centre = Measured::new(rim.centre, std, Vec::new());
+    let centre = MeasuredValue::new(rim.centre, std, Vec::new());
     Feature {
         diameter: Some(fitted.number(2.0 * fitted.surface.radius, &[(Freedom::Size, 2.0)])),
         axis: Some(fitted.axis(&rim.out)),
         ..Feature::new(
-            Kind::Hole,
+            FeatureKind::Hole,
             centre,
             measure.observed.touched_at(&rim.corners),
             FittedTo::Mesh,
@@ -626,7 +632,7 @@ fn of_other_outline(measure: &Measure, round: &[&Wall], flat: &[&Slot]) -> Vec<F
     };
     let named = |outline: OpeningOutline| Feature {
         kind: outline.kind,
-        depth: Some(Measured::new(outline.depth, None, Vec::new())),
+        depth: Some(MeasuredValue::new(outline.depth, None, Vec::new())),
         through: outline.through,
         form: Some(Form::Round(outline.form)),
         ..rim_feature(measure, &outline.rim)
@@ -659,9 +665,9 @@ fn boss_feature(measure: &Measure, walls: &[Wall], boss: &Boss) -> Feature {
         element: measure.axis_element(&fitted),
         ..Feature::new(
             if boss.is_turned {
-                Kind::Cylinder
+                FeatureKind::Cylinder
             } else {
-                Kind::Boss
+                FeatureKind::Boss
             },
             centre,
             measure.observed.touched_share(&wall.segments),
@@ -674,17 +680,17 @@ fn cylinder_feature(measure: &Measure, wall: &Wall) -> Feature {
     let fitted = measure.cylinder(wall, None);
     let middle = fitted.surface.nearest_on_axis(&wall.at(wall.middle()));
     let std = fitted.confirmed().and_then(|fit| fit.lateral_std(&middle));
-    let centre = Measured::new(middle, std, fitted.touches.clone());
+    let centre = MeasuredValue::new(middle, std, fitted.touches.clone());
     Feature {
         diameter: Some(fitted.number(2.0 * fitted.surface.radius, &[(Freedom::Size, 2.0)])),
-        length: Some(Measured::new(wall.height(), None, Vec::new())),
+        length: Some(MeasuredValue::new(wall.height(), None, Vec::new())),
         axis: Some(fitted.axis(&wall.axis)),
         walls: Some(Walls::Round(fitted.surface)),
         form: measure.round_form(&fitted, &wall.segments).map(Form::Round),
         facets: measure.facets(&fitted.surface, &wall.segments),
         element: measure.axis_element(&fitted),
         ..Feature::new(
-            Kind::Cylinder,
+            FeatureKind::Cylinder,
             centre,
             measure.observed.touched_share(&wall.segments),
             fitted.to,
@@ -693,7 +699,7 @@ fn cylinder_feature(measure: &Measure, wall: &Wall) -> Feature {
 }
 
 #[expect(clippy::too_many_lines)]
-fn slot_feature(measure: &Measure, slot: &Slot, kind: Kind) -> Feature {
+fn slot_feature(measure: &Measure, slot: &Slot, kind: FeatureKind) -> Feature {
     let fitted = measure.stadium(slot);
     let axis = fitted.axis(&slot.out);
     let Stadium { width, length, .. } = fitted.surface;
@@ -741,7 +747,7 @@ fn slot_feature(measure: &Measure, slot: &Slot, kind: Kind) -> Feature {
         measure.observed.touched_share(&slot.walls)
     };
     let depth = if slot.through == Some(true) && fitted.to == FittedTo::Mesh {
-        Measured::new(slot.depth, None, Vec::new())
+        MeasuredValue::new(slot.depth, None, Vec::new())
     } else {
         extent(measure, &fitted, &opening, &floor, &axis.value)
     };
@@ -766,7 +772,7 @@ fn slot_feature(measure: &Measure, slot: &Slot, kind: Kind) -> Feature {
 }
 
 /// [`FittedTo::Touches`] if all planes are fitted to touches, else the mesh.
-fn fitted_to(planes: &[&Fitted<Plane>]) -> FittedTo {
+fn fitted_to(planes: &[&FittedSurface<Plane>]) -> FittedTo {
     let is_touched = planes.iter().all(|plane| plane.to == FittedTo::Touches);
     if is_touched {
         FittedTo::Touches
@@ -814,7 +820,7 @@ fn edge_feature(measure: &Measure, edge: &StraightEdge) -> Option<Feature> {
 const SAME_CORNER: f64 = 0.02;
 const SAME_EXACT_CORNER: f64 = 1e-4;
 
-fn corners(parted: &Parted, measure: &Measure, edges: &[StraightEdge]) -> Vec<Feature> {
+fn corners(parted: &SegmentedMesh, measure: &Measure, edges: &[StraightEdge]) -> Vec<Feature> {
     let mut found: Vec<([usize; 3], Feature)> = Vec::new();
     for (at, first) in edges.iter().enumerate() {
         for second in &edges[..at] {
@@ -878,8 +884,8 @@ fn corner_of(measure: &Measure, planes: [usize; 3]) -> Option<Feature> {
     let touched = measure.observed.touched_along(&[point, point]);
     let to = fitted_to(&[&planes[0], &planes[1], &planes[2]]);
     Some(Feature::new(
-        Kind::Corner,
-        Measured::new(point, std, touches),
+        FeatureKind::Corner,
+        MeasuredValue::new(point, std, touches),
         touched,
         to,
     ))
@@ -894,7 +900,7 @@ fn plane_feature(measure: &Measure, number: usize) -> Option<Feature> {
         .map(|plane| (plane.point(), plane.normal()))?;
     let touched = measure.observed.touched_share(&[number]);
     let feature = Feature::new(
-        Kind::Plane,
+        FeatureKind::Plane,
         fitted.met(&point, &normal)?,
         touched,
         fitted.to,

@@ -3,9 +3,9 @@
 use nalgebra::{Matrix6, Point3, SMatrix, Vector3};
 
 use super::feature::FittedTo;
-use super::fit::{Cylinder, Fit, Plane, Surface};
+use super::fit::{Cylinder, Fit, Plane, SurfaceModel};
 use super::grow::SEEN_FACETS;
-use super::measure::{Fitted, Measure};
+use super::measure::{FittedSurface, Measure};
 use super::observe::NOT_ALIKE;
 use touchup_geometry::form::{
     Element, FlatForm, FormPoint, RoundForm, Shape, flat_form, round_form,
@@ -17,7 +17,7 @@ const CORNERS: usize = 16;
 
 /// Covariance in O of point and direction of a fit, m and rad: without the common errors of all
 /// touches.
-fn own_covariance<S: Surface>(fit: &Fit<S>) -> Matrix6<f64> {
+fn own_covariance<S: SurfaceModel>(fit: &Fit<S>) -> Matrix6<f64> {
     let rotation = fit.surface.pose_of().rotation.to_rotation_matrix();
     // the freedoms in their order: shifts along x, y, z of F, z leans towards x and y
     let mut by_freedoms = SMatrix::<f64, 6, 8>::zeros();
@@ -32,7 +32,7 @@ fn own_covariance<S: Surface>(fit: &Fit<S>) -> Matrix6<f64> {
 
 impl Measure<'_> {
     /// Touched points on the true surface: contacts of the balls.
-    fn form_points<S: Surface>(&self, fitted: &Fitted<S>) -> Vec<FormPoint> {
+    fn form_points<S: SurfaceModel>(&self, fitted: &FittedSurface<S>) -> Vec<FormPoint> {
         let on_surface = |o: super::fit::Observation| {
             let (_, normal) = fitted.surface.distance_and_normal(&o.point);
             FormPoint {
@@ -52,7 +52,11 @@ impl Measure<'_> {
     /// drawing the roundness of its corners.
     ///
     /// - `segments`: of the wall.
-    pub fn round_form(&self, fitted: &Fitted<Cylinder>, segments: &[usize]) -> Option<RoundForm> {
+    pub fn round_form(
+        &self,
+        fitted: &FittedSurface<Cylinder>,
+        segments: &[usize],
+    ) -> Option<RoundForm> {
         let (centre, axis) = (fitted.surface.center(), fitted.surface.axis());
         if fitted.to == FittedTo::Touches {
             let points = self.form_points(fitted);
@@ -66,7 +70,7 @@ impl Measure<'_> {
 
     /// Distance of a drawing's facets inside the surface through their corners, m; `None` if on it,
     /// and for a measured mesh.
-    pub fn facets(&self, surface: &impl Surface, segments: &[usize]) -> Option<f64> {
+    pub fn facets(&self, surface: &impl SurfaceModel, segments: &[usize]) -> Option<f64> {
         let parted = self.observed.parted;
         let rounding = parted.rounding?;
         let faces = segments
@@ -83,14 +87,14 @@ impl Measure<'_> {
     }
 
     /// Flatness of a plane fitted to touches.
-    pub fn flat_form(&self, fitted: &Fitted<Plane>) -> Option<FlatForm> {
+    pub fn flat_form(&self, fitted: &FittedSurface<Plane>) -> Option<FlatForm> {
         let points = self.form_points(fitted);
         flat_form(&points, &fitted.surface.point(), &fitted.surface.normal())
             .filter(|_| fitted.to == FittedTo::Touches)
     }
 
     /// The axis of a wall fitted to touches, over the heights of these.
-    pub fn axis_element(&self, fitted: &Fitted<Cylinder>) -> Option<Element> {
+    pub fn axis_element(&self, fitted: &FittedSurface<Cylinder>) -> Option<Element> {
         let direction = fitted.surface.axis();
         let places = self.touched_places(fitted)?;
         let heights = || {
@@ -109,7 +113,7 @@ impl Measure<'_> {
     }
 
     /// A plane fitted to touches, within the extent of these.
-    pub fn plane_element(&self, fitted: &Fitted<Plane>) -> Option<Element> {
+    pub fn plane_element(&self, fitted: &FittedSurface<Plane>) -> Option<Element> {
         let normal = fitted.surface.normal();
         let [u, v] = tangent_basis(&normal);
         let places = self.touched_places(fitted)?;
@@ -124,7 +128,10 @@ impl Measure<'_> {
         self.element(fitted, Shape::Plane, corners.into_iter().map(on).collect())
     }
 
-    fn touched_places<S: Surface>(&self, fitted: &Fitted<S>) -> Option<Vec<Point3<f64>>> {
+    fn touched_places<S: SurfaceModel>(
+        &self,
+        fitted: &FittedSurface<S>,
+    ) -> Option<Vec<Point3<f64>>> {
         let is_touched = fitted.to == FittedTo::Touches && !fitted.touches.is_empty();
         is_touched.then(|| {
             self.form_points(fitted)
@@ -134,9 +141,9 @@ impl Measure<'_> {
         })
     }
 
-    fn element<S: Surface>(
+    fn element<S: SurfaceModel>(
         &self,
-        fitted: &Fitted<S>,
+        fitted: &FittedSurface<S>,
         shape: Shape,
         extent: Vec<Point3<f64>>,
     ) -> Option<Element> {

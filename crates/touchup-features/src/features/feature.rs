@@ -9,7 +9,7 @@ use touchup_method::names;
 names! {
     /// Kind of a feature.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
-    pub enum Kind {
+    pub enum FeatureKind {
         /// round, through or blind; a stepped hole is several holes of one group
         Hole = "hole",
         /// between two parallel walls
@@ -46,7 +46,7 @@ names! {
 
 /// A number, its uncertainty, and its touches.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Measured<T> {
+pub struct MeasuredValue<T> {
     /// m, rad, or a point, m
     pub value: T,
     /// standard uncertainty, m or rad; `None` if undetermined
@@ -57,7 +57,7 @@ pub struct Measured<T> {
     pub is_at_least: bool,
 }
 
-impl<T> Measured<T> {
+impl<T> MeasuredValue<T> {
     /// A value other than a bound.
     pub fn new(value: T, std: Option<f64>, touches: Vec<u32>) -> Self {
         Self {
@@ -75,30 +75,30 @@ pub struct Feature {
     /// constant during refinement
     pub id: u32,
     /// kind of feature
-    pub kind: Kind,
+    pub kind: FeatureKind,
     /// intersection of the axis with the opening; middle of a boss' foot, of a shaft's shoulder or
     /// else of its length, of an edge, of a plane; the corner. Its uncertainty is the root mean
     /// square distance across the axis, for a plane along the normal.
-    pub centre: Measured<Point3<f64>>,
+    pub centre: MeasuredValue<Point3<f64>>,
     /// out of the opening, along an edge, the outward normal of a plane; unit vector. Its
     /// uncertainty is an angle, rad.
-    pub axis: Option<Measured<Vector3<f64>>>,
+    pub axis: Option<MeasuredValue<Vector3<f64>>>,
     /// along a slot, unit vector
     pub direction: Option<Vector3<f64>>,
     /// of a hole, notch, boss or cylinder, m
-    pub diameter: Option<Measured<f64>>,
+    pub diameter: Option<MeasuredValue<f64>>,
     /// of a slot, pocket, edge or cylinder, m
-    pub length: Option<Measured<f64>>,
+    pub length: Option<MeasuredValue<f64>>,
     /// of a slot or pocket, m
-    pub width: Option<Measured<f64>>,
+    pub width: Option<MeasuredValue<f64>>,
     /// from opening to floor, or the height of a boss, or of a step of a shaft above its shoulder,
     /// m
-    pub depth: Option<Measured<f64>>,
+    pub depth: Option<MeasuredValue<f64>>,
     /// whether a hole or slot goes through; `None` if the mesh ends before the hole does, or its
     /// floor is untouched
     pub through: Option<bool>,
     /// full angle of the countersink, rad
-    pub cone_angle: Option<Measured<f64>>,
+    pub cone_angle: Option<MeasuredValue<f64>>,
     /// holes of one number belong together: steps on one axis
     pub group: Option<u32>,
     /// both ends of an edge or slot, m
@@ -149,8 +149,8 @@ impl Feature {
 
     /// A feature with no numbers but its centre.
     pub(super) fn new(
-        kind: Kind,
-        centre: Measured<Point3<f64>>,
+        kind: FeatureKind,
+        centre: MeasuredValue<Point3<f64>>,
         touched: f64,
         fitted_to: FittedTo,
     ) -> Self {

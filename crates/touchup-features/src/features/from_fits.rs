@@ -3,8 +3,8 @@
 use nalgebra::{Point3, Vector3};
 
 use super::borders::on_both;
-use super::feature::{Feature, FittedTo, Kind, Measured, Walls};
-use super::fit::{Cylinder, Fit, Freedom, Plane, Stadium, Surface};
+use super::feature::{Feature, FeatureKind, FittedTo, MeasuredValue, Walls};
+use super::fit::{Cylinder, Fit, Freedom, Plane, Stadium, SurfaceModel};
 
 /// Numbers of touches, in ascending order.
 pub(super) type Touches = Vec<u32>;
@@ -33,9 +33,9 @@ impl Feature {
         let out = top.surface.normal();
         let centre = met(&top.surface, &wall.surface.center(), &wall.surface.axis());
         let kind = if wall.surface.concave {
-            Kind::Hole
+            FeatureKind::Hole
         } else {
-            Kind::Boss
+            FeatureKind::Boss
         };
         Self {
             axis: Some(axis_of(wall, &out, &touches)),
@@ -46,7 +46,7 @@ impl Feature {
                 &touches,
             )),
             depth: end.map(|end| apart(top, end, &touches)),
-            through: end.filter(|_| kind == Kind::Hole).map(|_| false),
+            through: end.filter(|_| kind == FeatureKind::Hole).map(|_| false),
             walls: Some(Walls::Round(wall.surface)),
             ..Self::touched(kind, centre, wall.lateral_std(&centre), touches)
         }
@@ -81,7 +81,7 @@ impl Feature {
             through: floor.map(|_| false),
             points: vec![centre - half, centre + half],
             walls: Some(Walls::Slot(wall.surface)),
-            ..Self::touched(Kind::Slot, centre, wall.middle_std(), touches)
+            ..Self::touched(FeatureKind::Slot, centre, wall.middle_std(), touches)
         }
     }
 
@@ -120,7 +120,7 @@ impl Feature {
         ends: &[Point3<f64>; 2],
         is_convex: bool,
         touches: Touches,
-    ) -> Option<(Measured<Vector3<f64>>, f64, Self)> {
+    ) -> Option<(MeasuredValue<Vector3<f64>>, f64, Self)> {
         let direction = planes[0].normal().cross(&planes[1].normal());
         let sine = direction.norm();
         let value = direction.try_normalize(0.0)? * (ends[1] - ends[0]).dot(&direction).signum();
@@ -131,12 +131,16 @@ impl Feature {
         let std = std_at(0, &middle)
             .zip(std_at(1, &middle))
             .map(|(s, t)| s.hypot(t) / sine);
-        let axis = Measured::new(value, None, touches.clone());
+        let axis = MeasuredValue::new(value, None, touches.clone());
         let edge = Self {
-            length: Some(Measured::new((ends[1] - ends[0]).norm(), None, Vec::new())),
+            length: Some(MeasuredValue::new(
+                (ends[1] - ends[0]).norm(),
+                None,
+                Vec::new(),
+            )),
             points: ends.to_vec(),
             is_convex: Some(is_convex),
-            ..Self::touched(Kind::Edge, middle, std, touches)
+            ..Self::touched(FeatureKind::Edge, middle, std, touches)
         };
         Some((axis, sine, edge))
     }
@@ -147,14 +151,14 @@ impl Feature {
         let centre = met(&plane.surface, middle, &normal);
         Self {
             axis: Some(axis_of(plane, &normal, &touches)),
-            ..Self::touched(Kind::Plane, centre, plane.std_at(&centre), touches)
+            ..Self::touched(FeatureKind::Plane, centre, plane.std_at(&centre), touches)
         }
     }
 
-    fn touched(kind: Kind, centre: Point3<f64>, std: Option<f64>, touches: Touches) -> Self {
+    fn touched(kind: FeatureKind, centre: Point3<f64>, std: Option<f64>, touches: Touches) -> Self {
         Self::new(
             kind,
-            Measured::new(centre, std, touches),
+            MeasuredValue::new(centre, std, touches),
             1.0,
             FittedTo::Touches,
         )
@@ -168,12 +172,12 @@ fn met(plane: &Plane, from: &Point3<f64>, direction: &Vector3<f64>) -> Point3<f6
 }
 
 /// Direction of a fit, with the sign of `out`.
-pub(super) fn axis_of<S: Surface>(
+pub(super) fn axis_of<S: SurfaceModel>(
     fit: &Fit<S>,
     out: &Vector3<f64>,
     touches: &Touches,
-) -> Measured<Vector3<f64>> {
-    Measured::new(
+) -> MeasuredValue<Vector3<f64>> {
+    MeasuredValue::new(
         fit.surface.axis_towards(out),
         fit.axis_std(),
         touches.clone(),
@@ -181,20 +185,20 @@ pub(super) fn axis_of<S: Surface>(
 }
 
 /// A number with its uncertainty, from its derivatives by the freedoms.
-pub(super) fn number<S: Surface>(
+pub(super) fn number<S: SurfaceModel>(
     fit: &Fit<S>,
     value: f64,
     by: &[(Freedom, f64)],
     touches: &Touches,
-) -> Measured<f64> {
-    Measured::new(value, fit.std_by(by), touches.clone())
+) -> MeasuredValue<f64> {
+    MeasuredValue::new(value, fit.std_by(by), touches.clone())
 }
 
 /// Distance of an end from a plane, m.
-fn apart(plane: &Fit<Plane>, end: &End, touches: &Touches) -> Measured<f64> {
+fn apart(plane: &Fit<Plane>, end: &End, touches: &Touches) -> MeasuredValue<f64> {
     let value = (end.point - plane.surface.point())
         .dot(&plane.surface.normal())
         .abs();
     let std = plane.std_at(&end.point).map(|std| std.hypot(end.sigma));
-    Measured::new(value, std, touches.clone())
+    MeasuredValue::new(value, std, touches.clone())
 }

@@ -73,7 +73,7 @@ const MOST_FITTED: usize = 300;
 impl Segmentation {
     /// Parts a mesh.
     pub(super) fn of(facets: &Facets, scale: MeshScale) -> Self {
-        let mut growing = Growing::of(facets, scale);
+        let mut growing = RegionGrower::of(facets, scale);
         let mut seeds = growing.seeds();
         let mut flats = Flats::of(facets);
         for (closeness, tolerance) in growing.scale.tolerances(flats.is_some()) {
@@ -92,7 +92,7 @@ impl Segmentation {
     }
 }
 
-struct Growing<'a> {
+struct RegionGrower<'a> {
     facets: &'a Facets<'a>,
     scale: MeshScale,
     of_face: Vec<u32>,
@@ -108,7 +108,7 @@ struct Growing<'a> {
     tolerance: f64,
 }
 
-impl<'a> Growing<'a> {
+impl<'a> RegionGrower<'a> {
     fn of(facets: &'a Facets<'a>, scale: MeshScale) -> Self {
         let slots = facets.slots();
         Self {

@@ -3,7 +3,7 @@
 use nalgebra::{Point3, Vector3};
 
 use super::rays::RayHit;
-use super::scene::Parted;
+use super::scene::SegmentedMesh;
 use super::walls::Wall;
 use touchup_geometry::mesh::{BoxQuery, FaceId};
 use touchup_geometry::numeric::{median, tangent_basis};
@@ -128,7 +128,7 @@ impl WallEnd {
 }
 
 /// All round holes.
-pub(super) fn holes(parted: &Parted, walls: &[Wall]) -> Vec<Hole> {
+pub(super) fn holes(parted: &SegmentedMesh, walls: &[Wall]) -> Vec<Hole> {
     let is_hole = |wall: &Wall| wall.is_concave && !wall.is_cone();
     let numbers = (0..walls.len()).filter(|&at| is_hole(&walls[at]));
     let found: Vec<Hole> = numbers.filter_map(|at| hole(parted, walls, at)).collect();
@@ -142,7 +142,7 @@ pub(super) fn holes(parted: &Parted, walls: &[Wall]) -> Vec<Hole> {
 }
 
 /// Whether a wall is a fragment of the same hole as a better one: with few touches it is crooked.
-fn is_fragment_of(parted: &Parted, wall: &Wall, better: &Wall) -> bool {
+fn is_fragment_of(parted: &SegmentedMesh, wall: &Wall, better: &Wall) -> bool {
     let (part, whole) = (
         parted.segment(wall.segments[0]),
         parted.segment(better.segments[0]),
@@ -161,7 +161,7 @@ fn is_fragment_of(parted: &Parted, wall: &Wall, better: &Wall) -> bool {
         && beyond < better.radius() + wall.height()
 }
 
-fn hole(parted: &Parted, walls: &[Wall], at: usize) -> Option<Hole> {
+fn hole(parted: &SegmentedMesh, walls: &[Wall], at: usize) -> Option<Hole> {
     let wall = &walls[at];
     let radius = wall.radius();
     // a ball that went around a wall was inside of it: mesh there is an untouched plug, and missing
@@ -228,7 +228,7 @@ fn hole(parted: &Parted, walls: &[Wall], at: usize) -> Option<Hole> {
 }
 
 /// The plane at which a hole narrows, if another hole continues behind it.
-fn shoulder(parted: &Parted, walls: &[Wall], at: usize, end: &WallEnd) -> Option<usize> {
+fn shoulder(parted: &SegmentedMesh, walls: &[Wall], at: usize, end: &WallEnd) -> Option<usize> {
     let wall = &walls[at];
     let is_next = |next: &&Wall| {
         let is_near = next.gap(wall).abs() < SAME_HOLE * wall.radius();
@@ -251,7 +251,7 @@ fn shoulder(parted: &Parted, walls: &[Wall], at: usize, end: &WallEnd) -> Option
 
 /// Whether a wall is a cut at the rim of the part: beside its open side neither a wall nor the land
 /// around the opening continues.
-fn is_notch(parted: &Parted, wall: &Wall, end: &WallEnd) -> bool {
+fn is_notch(parted: &SegmentedMesh, wall: &Wall, end: &WallEnd) -> bool {
     let (radius, around) = (wall.radius(), parted.around(wall.segments[0]));
     let [e, g] = tangent_basis(&wall.axis);
     let mut rays = around.rays(radius);
@@ -284,7 +284,7 @@ fn is_notch(parted: &Parted, wall: &Wall, end: &WallEnd) -> bool {
 
 /// Whether most lines from the axis to the wall are free. The closure of the hole, however shallow,
 /// does not matter.
-fn is_free(parted: &Parted, wall: &Wall) -> bool {
+fn is_free(parted: &SegmentedMesh, wall: &Wall) -> bool {
     let radius = wall.radius();
     let [e, g] = tangent_basis(&wall.axis);
     let mut rays = parted.around(wall.segments[0]).rays(radius);
@@ -307,7 +307,7 @@ fn is_free(parted: &Parted, wall: &Wall) -> bool {
     2 * free >= PROBES * PROBE_RAYS
 }
 
-fn end(parted: &Parted, wall: &Wall, which: usize) -> WallEnd {
+fn end(parted: &SegmentedMesh, wall: &Wall, which: usize) -> WallEnd {
     let (t, out) = (wall.ends[which], if which == 0 { -1.0 } else { 1.0 });
     let radius = wall.radius();
     let middle = wall.middle();
@@ -345,7 +345,7 @@ fn end(parted: &Parted, wall: &Wall, which: usize) -> WallEnd {
 
 /// Whether the mesh ends there: the continuation of the wall is neither scanned nor touched. With a
 /// plane around the end, the border must be as long as half of the turn.
-fn is_torn(parted: &Parted, wall: &Wall, end: &WallEnd) -> bool {
+fn is_torn(parted: &SegmentedMesh, wall: &Wall, end: &WallEnd) -> bool {
     let (middle, [e, g]) = (wall.at(end.t), tangent_basis(&wall.axis));
     let near = TORN.map(|radii| radii * wall.radius());
     // of a box that holds all of them, however the axis lies
@@ -402,7 +402,7 @@ fn is_countersink(cone: &Wall, wall: &Wall, out: f64) -> bool {
 }
 
 /// The plane square to the axis that closes a wall at `t`.
-fn floor_at(parted: &Parted, wall: &Wall, t: f64) -> Option<usize> {
+fn floor_at(parted: &SegmentedMesh, wall: &Wall, t: f64) -> Option<usize> {
     let number = parted.segment_at(
         &parted.around(wall.segments[0]),
         &wall.at(t),
@@ -427,7 +427,7 @@ pub(super) fn groups(walls: &[Wall], holes: &[Hole]) -> Vec<Option<u32>> {
 }
 
 /// All round bosses, and steps of shafts: walls with material inside on a plane as foot.
-pub(super) fn bosses(parted: &Parted, walls: &[Wall]) -> Vec<Boss> {
+pub(super) fn bosses(parted: &SegmentedMesh, walls: &[Wall]) -> Vec<Boss> {
     let is_boss =
         |wall: &Wall| !wall.is_concave && !wall.is_cone() && wall.coverage >= BOSS_COVERAGE;
     (0..walls.len())
@@ -450,7 +450,7 @@ fn is_shaft_below(wider: &Wall, wall: &Wall, foot: f64, out: f64) -> bool {
 
 /// Whether the part is round about the axis of a wall below its shoulder at `foot`, whatever the
 /// segmentation there: a badly scanned shaft, touched in strips.
-fn is_round_below(parted: &Parted, wall: &Wall, foot: f64, out: f64) -> bool {
+fn is_round_below(parted: &SegmentedMesh, wall: &Wall, foot: f64, out: f64) -> bool {
     let (radius, axis, middle) = (wall.radius(), wall.axis, wall.at(foot));
     let reach = Vector3::repeat(BELOW_RADII[1] * radius);
     let mut query = BoxQuery::default();
@@ -491,7 +491,7 @@ const BELOW_RADII: [f64; 2] = [1.05, 3.0];
 const BELOW_RADIAL: f64 = 0.94;
 const BELOW_ALIKE: f64 = 0.1;
 
-fn boss(parted: &Parted, walls: &[Wall], at: usize) -> Option<Boss> {
+fn boss(parted: &SegmentedMesh, walls: &[Wall], at: usize) -> Option<Boss> {
     let wall = &walls[at];
     let (radius, around) = (wall.radius(), parted.around(wall.segments[0]));
     let rings = if parted.rounding.is_some() {

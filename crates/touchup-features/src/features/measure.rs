@@ -5,12 +5,12 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Point3, Vector3};
 
-use super::feature::{FittedTo, Measured};
+use super::feature::{FittedTo, MeasuredValue};
 use super::fit::{
-    Cone, Cylinder, Ends, Fit, FitParams, Freedom, Observation, Plane, Stadium, Surface, fit,
+    Cone, Cylinder, Ends, Fit, FitParams, Freedom, Observation, Plane, Stadium, SurfaceModel, fit,
     fit_mesh,
 };
-use super::observe::Observed;
+use super::observe::SegmentTouches;
 use super::primitive::Primitive;
 use super::slots::Slot;
 use super::walls::Wall;
@@ -19,7 +19,7 @@ use touchup_method::stylus::ProbedPoint;
 
 /// A fitted surface and its data.
 #[derive(Clone, Debug)]
-pub(super) struct Fitted<S> {
+pub(super) struct FittedSurface<S> {
     pub surface: S,
     /// `None` if no fit held: the surface comes from the segments
     pub fit: Option<Fit<S>>,
@@ -35,8 +35,8 @@ pub(super) struct Fitted<S> {
 
 /// Fits surfaces; each plane once.
 pub(super) struct Measure<'a> {
-    pub observed: &'a Observed<'a>,
-    planes: RefCell<BTreeMap<usize, Fitted<Plane>>>,
+    pub observed: &'a SegmentTouches<'a>,
+    planes: RefCell<BTreeMap<usize, FittedSurface<Plane>>>,
 }
 
 /// Minimum number of touches on a surface; fewer leave it to the mesh.
@@ -77,7 +77,7 @@ fn is_over_end(touch: &ProbedPoint, wall: &Wall) -> bool {
 }
 
 impl<'a> Measure<'a> {
-    pub fn new(observed: &'a Observed<'a>) -> Self {
+    pub fn new(observed: &'a SegmentTouches<'a>) -> Self {
         Self {
             observed,
             planes: RefCell::new(BTreeMap::new()),
@@ -85,7 +85,7 @@ impl<'a> Measure<'a> {
     }
 
     /// The plane of a segment.
-    pub fn plane(&self, number: usize) -> Option<Fitted<Plane>> {
+    pub fn plane(&self, number: usize) -> Option<FittedSurface<Plane>> {
         if let Some(known) = self.planes.borrow().get(&number) {
             return Some(known.clone());
         }
@@ -100,7 +100,7 @@ impl<'a> Measure<'a> {
 
     /// The plane of a segment beside an edge: a strip of touches along the edge places the plane,
     /// if wide in comparison with the mesh of the plane. `None` for other segments.
-    pub fn plane_beside_edge(&self, number: usize) -> Option<Fitted<Plane>> {
+    pub fn plane_beside_edge(&self, number: usize) -> Option<FittedSurface<Plane>> {
         let plane = self.plane(number)?;
         if plane.to == FittedTo::Touches {
             return Some(plane);
@@ -131,7 +131,7 @@ impl<'a> Measure<'a> {
         number: usize,
         guess: &Plane,
         is_wide: impl Fn([f64; 3]) -> bool,
-    ) -> Fitted<Plane> {
+    ) -> FittedSurface<Plane> {
         let all = self.observed.touches_of(&[number]);
         let is_inside = self.inside(&all, &guess.normal());
         let spread = |touches: &[u32]| {
@@ -164,7 +164,7 @@ impl<'a> Measure<'a> {
         touches: &[u32],
         point: &Point3<f64>,
         normal: &Vector3<f64>,
-    ) -> Option<Fitted<Plane>> {
+    ) -> Option<FittedSurface<Plane>> {
         let is_felt = !touches.is_empty();
         is_felt.then(|| {
             self.fitted(
@@ -178,7 +178,7 @@ impl<'a> Measure<'a> {
     }
 
     /// The cylinder of a segment; `None` for other segments.
-    pub fn shaft(&self, number: usize) -> Option<Fitted<Cylinder>> {
+    pub fn shaft(&self, number: usize) -> Option<FittedSurface<Cylinder>> {
         let Primitive::Cylinder(guess) = self.observed.parted.segment(number).primitive else {
             return None;
         };
@@ -200,7 +200,7 @@ impl<'a> Measure<'a> {
     /// The cylinder of a wall.
     ///
     /// - `rim`: number of the plane around its opening.
-    pub fn cylinder(&self, wall: &Wall, rim: Option<usize>) -> Fitted<Cylinder> {
+    pub fn cylinder(&self, wall: &Wall, rim: Option<usize>) -> FittedSurface<Cylinder> {
         let touches = self.touches_around(wall);
         let (mut axis, mut axis_sigma) = (wall.axis, None);
         let height = if touches.is_empty() {
@@ -229,7 +229,7 @@ impl<'a> Measure<'a> {
     }
 
     /// The cone of a wall; `None` for a cylinder.
-    pub fn cone(&self, wall: &Wall) -> Option<Fitted<Cone>> {
+    pub fn cone(&self, wall: &Wall) -> Option<FittedSurface<Cone>> {
         let guess = Cone::new(
             wall.at(wall.middle()),
             &wall.axis,
@@ -317,7 +317,7 @@ impl<'a> Measure<'a> {
     }
 
     /// The walls of a slot or pocket.
-    pub fn stadium(&self, slot: &Slot) -> Fitted<Stadium> {
+    pub fn stadium(&self, slot: &Slot) -> FittedSurface<Stadium> {
         let ends = slot.shape;
         let land = self
             .plane(slot.land)
@@ -383,14 +383,14 @@ impl<'a> Measure<'a> {
     ///
     /// - `around`: number of the plane that gives the unevenness of the mesh: a small surface
     ///   follows the waves of the mesh.
-    fn fitted<S: Surface>(
+    fn fitted<S: SurfaceModel>(
         &self,
         guess: &S,
         touches: Vec<u32>,
         of_mesh: &[Observation],
         axis_sigma: Option<f64>,
         around: Option<usize>,
-    ) -> Fitted<S> {
+    ) -> FittedSurface<S> {
         let [common_sigma, shift_sigma] = self.observed.systematic(&touches);
         let params = FitParams {
             common_sigma,
@@ -408,7 +408,7 @@ impl<'a> Measure<'a> {
                 .map(|(touch, _)| touch);
             let touches = touches.collect();
             let (surface, to) = (found.surface.clone(), FittedTo::Touches);
-            return Fitted {
+            return FittedSurface {
                 surface,
                 fit: Some(found),
                 touches,
@@ -438,7 +438,7 @@ impl<'a> Measure<'a> {
         let uneven = found
             .as_ref()
             .map_or(0.0, |found| found.unevenness(of_mesh));
-        Fitted {
+        FittedSurface {
             surface,
             fit: found,
             touches: Vec::new(),
@@ -471,33 +471,33 @@ impl<'a> Measure<'a> {
     }
 }
 
-impl Fitted<Plane> {
+impl FittedSurface<Plane> {
     /// Intersection of a line with the plane, m; its uncertainty is along the normal.
     pub fn met(
         &self,
         from: &Point3<f64>,
         direction: &Vector3<f64>,
-    ) -> Option<Measured<Point3<f64>>> {
+    ) -> Option<MeasuredValue<Point3<f64>>> {
         Some(self.place(from + direction * self.surface.along(from, direction)?))
     }
 }
 
-impl Fitted<Cylinder> {
+impl FittedSurface<Cylinder> {
     /// Exit of a line from the cylinder, m; its uncertainty is along the normal there.
     pub fn met(
         &self,
         from: &Point3<f64>,
         direction: &Vector3<f64>,
-    ) -> Option<Measured<Point3<f64>>> {
+    ) -> Option<MeasuredValue<Point3<f64>>> {
         Some(self.place(from + direction * self.surface.exit(from, direction)?))
     }
 }
 
-impl<S: Surface> Fitted<S> {
+impl<S: SurfaceModel> FittedSurface<S> {
     /// A place on the surface, m; its uncertainty is along the normal.
-    fn place(&self, value: Point3<f64>) -> Measured<Point3<f64>> {
+    fn place(&self, value: Point3<f64>) -> MeasuredValue<Point3<f64>> {
         let std = self.confirmed().and_then(|fit| fit.std_at(&value));
-        Measured::new(value, std, self.touches.clone())
+        MeasuredValue::new(value, std, self.touches.clone())
     }
 
     /// Standard deviation at a place without the common error of all touches, m: two surfaces of a
@@ -515,9 +515,9 @@ impl<S: Surface> Fitted<S> {
     }
 
     /// The direction of the surface, oriented along `direction`.
-    pub fn axis(&self, direction: &Vector3<f64>) -> Measured<Vector3<f64>> {
+    pub fn axis(&self, direction: &Vector3<f64>) -> MeasuredValue<Vector3<f64>> {
         let value = self.surface.axis_towards(direction);
-        Measured::new(
+        MeasuredValue::new(
             value,
             self.confirmed().and_then(Fit::axis_std),
             self.touches.clone(),
@@ -525,8 +525,8 @@ impl<S: Surface> Fitted<S> {
     }
 
     /// A number with its uncertainty, if the fit is confirmed.
-    pub fn number(&self, value: f64, by: &[(Freedom, f64)]) -> Measured<f64> {
-        Measured::new(
+    pub fn number(&self, value: f64, by: &[(Freedom, f64)]) -> MeasuredValue<f64> {
+        MeasuredValue::new(
             value,
             self.confirmed().and_then(|fit| fit.std_by(by)),
             self.touches.clone(),

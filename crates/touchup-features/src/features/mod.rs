@@ -41,7 +41,7 @@ mod track;
 mod walls;
 
 pub use detect::{Detection, detect};
-pub use feature::{Feature, FittedTo, Form, Kind, Measured, Walls};
+pub use feature::{Feature, FeatureKind, FittedTo, Form, MeasuredValue, Walls};
 pub use from_fits::End;
 pub use k_means::{KMeans, k_means};
 pub use measure::{LEAST_TOUCHES, LEAST_TURN};

@@ -1,13 +1,13 @@
 //! Numbers of a feature, of its form and of a relation, each by its quantity: m and rad.
 
-use super::feature::{Feature, Form, Measured};
+use super::feature::{Feature, Form, MeasuredValue};
 use super::quantity::InspectedQuantity;
 use super::relations::{Relation, RelationKind};
 use touchup_geometry::form::{Deviation, Estimate, RoundForm};
 
 impl Feature {
     /// The known sizes, in the order of [`InspectedQuantity::SIZES`].
-    pub fn sizes(&self) -> impl Iterator<Item = (InspectedQuantity, &Measured<f64>)> {
+    pub fn sizes(&self) -> impl Iterator<Item = (InspectedQuantity, &MeasuredValue<f64>)> {
         let sizes = [
             &self.diameter,
             &self.length,
@@ -22,7 +22,7 @@ impl Feature {
     }
 
     /// Diameter or width.
-    pub fn main_size(&self) -> Option<&Measured<f64>> {
+    pub fn main_size(&self) -> Option<&MeasuredValue<f64>> {
         self.diameter.as_ref().or(self.width.as_ref())
     }
 }

@@ -5,18 +5,18 @@ use std::collections::BTreeMap;
 use nalgebra::Point3;
 
 use super::facets::NONE;
-use super::fit::{Observation, Surface};
+use super::fit::{Observation, SurfaceModel};
 use super::marks::NumberSet;
 use super::primitive::Primitive;
-use super::scene::Parted;
+use super::scene::SegmentedMesh;
 use super::slots::samples;
 use touchup_geometry::mesh::{FaceId, TriMesh, VertexId};
 use touchup_geometry::numeric::{PointGrid, VoxelKey, distinct, voxel_of};
 use touchup_method::stylus::ProbedPoint;
 
-/// The touches on a parted mesh.
-pub(super) struct Observed<'a> {
-    pub parted: &'a Parted<'a>,
+/// The touches on a segmented mesh.
+pub(super) struct SegmentTouches<'a> {
+    pub parted: &'a SegmentedMesh<'a>,
     touches: &'a [ProbedPoint],
     /// numbers of the touches of each segment
     of_segment: Vec<Vec<u32>>,
@@ -59,9 +59,9 @@ const MOST_FACES: usize = 400;
 /// Vertices of a measured mesh within this number of edges share their error.
 const SHARED_EDGES: f64 = 3.0;
 
-impl<'a> Observed<'a> {
+impl<'a> SegmentTouches<'a> {
     /// - `of_face`: the segment of each face, seams included.
-    pub fn of(parted: &'a Parted<'a>, of_face: &[u32], touches: &'a [ProbedPoint]) -> Self {
+    pub fn of(parted: &'a SegmentedMesh<'a>, of_face: &[u32], touches: &'a [ProbedPoint]) -> Self {
         let reach = touches.iter().map(|touch| touch.radius).fold(0.0, f64::max);
         let reach = if reach > 0.0 { reach } else { REACH };
         let mut observed = Self {
@@ -117,7 +117,7 @@ impl<'a> Observed<'a> {
     /// - `is_of`: whether a point of the surface is in the relevant part.
     pub fn touches_on(
         &self,
-        surface: &impl Surface,
+        surface: &impl SurfaceModel,
         is_of: impl Fn(&Point3<f64>) -> bool,
     ) -> Vec<u32> {
         let is_on = |touch: &ProbedPoint| {
@@ -228,7 +228,7 @@ impl<'a> Observed<'a> {
     /// The vertices of some segments, in ascending order; of round ones in a drawing without those
     /// on chords: a tessellation puts corners of neighbours there, off the surface.
     fn vertices_of(&self, segments: &[usize]) -> Vec<VertexId> {
-        let Parted {
+        let SegmentedMesh {
             facets,
             segmentation,
             rounding,
@@ -317,7 +317,7 @@ pub(super) fn observation(touch: &ProbedPoint, group: u32) -> Observation {
     }
 }
 
-/// As [`Observed::systematic`].
+/// As [`SegmentTouches::systematic`].
 pub(super) fn systematic<'a>(touches: impl Iterator<Item = &'a ProbedPoint>) -> [f64; 2] {
     let (sum, count) = touches.fold(([0.0; 2], 0.0f64), |([common, shift], count), touch| {
         (

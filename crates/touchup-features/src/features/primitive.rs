@@ -4,7 +4,7 @@
 use nalgebra::{Matrix2, Matrix3, Point3, SVector, Vector2, Vector3};
 
 use super::facets::Facets;
-use super::fit::{Cone, Cylinder, FREEDOMS, Freedom, Plane, Steps, Surface};
+use super::fit::{Cone, Cylinder, FREEDOMS, Freedom, Plane, Steps, SurfaceModel};
 use touchup_geometry::mesh::{FaceId, VertexId};
 use touchup_geometry::numeric::{NormalEquations, tangent_basis};
 
@@ -88,7 +88,7 @@ pub(super) fn belongs(facets: &Facets, face: u32, primitive: &Primitive, toleran
 fn normal_beneath(
     facets: &Facets,
     face: u32,
-    surface: &impl Surface,
+    surface: &impl SurfaceModel,
     tolerance: f64,
 ) -> Option<Vector3<f64>> {
     let own = surface.to_own();
@@ -287,7 +287,7 @@ pub(super) fn refined(primitive: &Primitive, facets: &Facets, faces: &[u32]) -> 
 ///
 /// - `are_square`: whether the normals of the surface are square to its axis; then those of the
 ///   faces count.
-fn moved_to<S: Surface, const N: usize>(
+fn moved_to<S: SurfaceModel, const N: usize>(
     start: &S,
     facets: &Facets,
     faces: &[u32],

@@ -2,7 +2,7 @@
 
 use serde::{Serialize, Serializer};
 
-use super::feature::Kind;
+use super::feature::FeatureKind;
 use touchup_method::names;
 
 names! {
@@ -121,17 +121,26 @@ impl InspectedQuantity {
     }
 
     /// Whether features of this kind have the quantity.
-    pub fn is_of(self, kind: Kind) -> bool {
-        let is_round = matches!(kind, Kind::Hole | Kind::Boss | Kind::Cylinder | Kind::Notch);
-        let is_slot = matches!(kind, Kind::Slot | Kind::Pocket);
+    pub fn is_of(self, kind: FeatureKind) -> bool {
+        let is_round = matches!(
+            kind,
+            FeatureKind::Hole | FeatureKind::Boss | FeatureKind::Cylinder | FeatureKind::Notch
+        );
+        let is_slot = matches!(kind, FeatureKind::Slot | FeatureKind::Pocket);
         match self {
             Self::Diameter | Self::Roundness | Self::Cylindricity | Self::Straightness => is_round,
             Self::Width => is_slot,
-            Self::Length => is_slot || matches!(kind, Kind::Edge | Kind::Cylinder),
-            Self::Depth => is_slot || matches!(kind, Kind::Hole | Kind::Boss | Kind::Cylinder),
-            Self::ConeAngle => kind == Kind::Hole,
-            Self::Flatness => kind == Kind::Plane,
-            Self::Position => !matches!(kind, Kind::Plane | Kind::Corner),
+            Self::Length => is_slot || matches!(kind, FeatureKind::Edge | FeatureKind::Cylinder),
+            Self::Depth => {
+                is_slot
+                    || matches!(
+                        kind,
+                        FeatureKind::Hole | FeatureKind::Boss | FeatureKind::Cylinder
+                    )
+            }
+            Self::ConeAngle => kind == FeatureKind::Hole,
+            Self::Flatness => kind == FeatureKind::Plane,
+            Self::Position => !matches!(kind, FeatureKind::Plane | FeatureKind::Corner),
             _ => true,
         }
     }
@@ -162,11 +171,13 @@ mod tests {
     fn every_quantity_is_of_some_kind_and_every_kind_has_a_place() {
         for quantity in InspectedQuantity::ALL {
             assert!(
-                Kind::ALL.into_iter().any(|kind| quantity.is_of(kind)),
+                FeatureKind::ALL
+                    .into_iter()
+                    .any(|kind| quantity.is_of(kind)),
                 "{quantity}"
             );
         }
-        for kind in Kind::ALL {
+        for kind in FeatureKind::ALL {
             assert!(
                 [
                     InspectedQuantity::X,
@@ -179,8 +190,8 @@ mod tests {
             );
         }
         assert!(
-            !InspectedQuantity::Position.is_of(Kind::Plane)
-                && !InspectedQuantity::Width.is_of(Kind::Hole)
+            !InspectedQuantity::Position.is_of(FeatureKind::Plane)
+                && !InspectedQuantity::Width.is_of(FeatureKind::Hole)
         );
     }
 }

@@ -1,6 +1,6 @@
 //! Relations between touched features, as in a drawing.
 
-use super::feature::{Feature, Kind};
+use super::feature::{Feature, FeatureKind};
 use touchup_geometry::form::{
     Element, Estimate, Shape, angle, coaxiality, concentricity, distance, orientation,
 };
@@ -109,12 +109,12 @@ fn reach(element: &Element) -> f64 {
     element.extent.iter().flat_map(from).fold(0.0, f64::max)
 }
 
-type Related<'a> = (&'a Feature, &'a Element);
+type FeatureElement<'a> = (&'a Feature, &'a Element);
 
 impl Relation {
     /// Of two planes or two axes; `None` if neither parallel nor square, and for axes that are not
     /// parallel.
-    fn of_alike<'a>(one: &Related<'a>, other: &Related<'a>) -> Option<Self> {
+    fn of_alike<'a>(one: &FeatureElement<'a>, other: &FeatureElement<'a>) -> Option<Self> {
         let (toleranced, datum) = if reach(one.1) > reach(other.1) {
             (other, one)
         } else {
@@ -129,7 +129,7 @@ impl Relation {
         }
     }
 
-    fn new(kind: RelationKind, of: &Related, to: &Related) -> Self {
+    fn new(kind: RelationKind, of: &FeatureElement, to: &FeatureElement) -> Self {
         let (zone, angle, distance, concentricity) = (None, None, None, None);
         Self {
             kind,
@@ -142,7 +142,7 @@ impl Relation {
         }
     }
 
-    fn oriented(of: &Related, to: &Related) -> Option<Self> {
+    fn oriented(of: &FeatureElement, to: &FeatureElement) -> Option<Self> {
         let found = orientation(of.1, to.1)?;
         let is_along = cosine(of.1, to.1) > std::f64::consts::FRAC_1_SQRT_2;
         // an axis is square to a plane along its normal
@@ -166,14 +166,14 @@ impl Relation {
         })
     }
 
-    fn of_axes(of: &Related, to: &Related) -> Option<Self> {
+    fn of_axes(of: &FeatureElement, to: &FeatureElement) -> Option<Self> {
         let apart = distance(of.1, to.1)?;
         let angle = angle(of.1, to.1);
         let diameter = |f: &Feature| f.diameter.as_ref().map_or(0.0, |diameter| diameter.value);
         let is_round = |f: &Feature| {
             matches!(
                 f.kind,
-                Kind::Hole | Kind::Boss | Kind::Cylinder | Kind::Notch
+                FeatureKind::Hole | FeatureKind::Boss | FeatureKind::Cylinder | FeatureKind::Notch
             )
         };
         if apart.value < ONE_AXIS * diameter(of.0).min(diameter(to.0))

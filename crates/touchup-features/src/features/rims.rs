@@ -7,10 +7,10 @@ use std::f64::consts::{PI, TAU};
 use nalgebra::{Point3, Vector3};
 
 use super::facets::{Facets, NONE};
-use super::feature::Kind;
-use super::fit::{Cylinder, Fit, FitParams, Observation, Surface, fit_mesh};
+use super::feature::FeatureKind;
+use super::fit::{Cylinder, Fit, FitParams, Observation, SurfaceModel, fit_mesh};
 use super::grow::{ROUNDING, SEEN_FACETS};
-use super::scene::Parted;
+use super::scene::SegmentedMesh;
 use touchup_geometry::form::RoundForm;
 use touchup_geometry::mesh::{FaceId, VertexId};
 use touchup_geometry::numeric::{mean, tangent_basis};
@@ -31,7 +31,7 @@ pub(super) struct RoundOpening {
 #[derive(Clone, Debug)]
 pub(super) struct OpeningOutline {
     /// a hole, or a boss
-    pub kind: Kind,
+    pub kind: FeatureKind,
     /// the circle nearest to it
     pub rim: RoundOpening,
     /// distance from the plane to the floor or the top, or through to the other side, m
@@ -43,7 +43,7 @@ pub(super) struct OpeningOutline {
 }
 
 /// A loop of border edges, in the order of their faces: the part is on its left.
-struct Loop {
+struct BoundaryLoop {
     corners: Vec<Point3<f64>>,
     /// for the edge from each corner its face, or the one across it
     faces: Vec<u32>,
@@ -78,7 +78,7 @@ const AXIS: f64 = 0.0087;
 
 /// All round openings, in order of their first faces. The longest border of each piece is its outer
 /// end.
-pub(super) fn rims(parted: &Parted) -> Vec<RoundOpening> {
+pub(super) fn rims(parted: &SegmentedMesh) -> Vec<RoundOpening> {
     let loops = loops(parted, open_edges(&parted.facets));
     let mut longest: BTreeMap<u32, (f64, usize)> = BTreeMap::new();
     for (at, border) in loops.iter().enumerate() {
@@ -99,7 +99,7 @@ pub(super) fn rims(parted: &Parted) -> Vec<RoundOpening> {
 /// Outlines of recesses in the planes of a drawing and of bosses on them.
 ///
 /// - `is_known`: by segment, whether it is a wall of a known feature.
-pub(super) fn outlines(parted: &Parted, is_known: &[bool]) -> Vec<OpeningOutline> {
+pub(super) fn outlines(parted: &SegmentedMesh, is_known: &[bool]) -> Vec<OpeningOutline> {
     let of_plane = |number: usize| {
         let is_of = move |face: u32| parted.segmentation.of_face[face as usize] == number as u32;
         let faces = parted.segment(number).faces.iter();
@@ -133,7 +133,10 @@ fn open_edges<'a>(facets: &'a Facets) -> impl Iterator<Item = (VertexId, VertexI
 /// Closed chains of edges, without those through a vertex of several.
 ///
 /// - `edges`: start vertex, end vertex and a face of each.
-fn loops(parted: &Parted, edges: impl Iterator<Item = (VertexId, VertexId, u32)>) -> Vec<Loop> {
+fn loops(
+    parted: &SegmentedMesh,
+    edges: impl Iterator<Item = (VertexId, VertexId, u32)>,
+) -> Vec<BoundaryLoop> {
     let mut next: BTreeMap<VertexId, (VertexId, u32)> = BTreeMap::new();
     let mut forked: Vec<VertexId> = Vec::new();
     for (from, to, face) in edges {
@@ -151,7 +154,7 @@ fn loops(parted: &Parted, edges: impl Iterator<Item = (VertexId, VertexId, u32)>
     for (_, start) in starts {
         let (mut at, mut border, mut is_simple) = (
             start,
-            Loop {
+            BoundaryLoop {
                 corners: Vec::new(),
                 faces: Vec::new(),
             },
@@ -170,7 +173,7 @@ fn loops(parted: &Parted, edges: impl Iterator<Item = (VertexId, VertexId, u32)>
     loops
 }
 
-impl Loop {
+impl BoundaryLoop {
     fn edges(&self) -> impl Iterator<Item = (Point3<f64>, Point3<f64>)> + '_ {
         (0..self.corners.len())
             .map(|i| (self.corners[i], self.corners[(i + 1) % self.corners.len()]))
@@ -204,7 +207,12 @@ impl Loop {
     }
 
     /// The recess in plane number `plane` or the boss on it, if the loop goes around it.
-    fn outline(&self, parted: &Parted, plane: usize, is_known: &[bool]) -> Option<OpeningOutline> {
+    fn outline(
+        &self,
+        parted: &SegmentedMesh,
+        plane: usize,
+        is_known: &[bool],
+    ) -> Option<OpeningOutline> {
         if self.corners.len() < LEAST_CORNERS {
             return None;
         }
@@ -235,9 +243,9 @@ impl Loop {
             .sum::<f64>()
             > 0.0;
         let (kind, way) = if is_raised {
-            (Kind::Boss, out)
+            (FeatureKind::Boss, out)
         } else {
-            (Kind::Hole, -out)
+            (FeatureKind::Hole, -out)
         };
         let around = parted.around(plane);
         let mut rays = around.rays(radius);
@@ -269,7 +277,7 @@ impl Loop {
         })
     }
 
-    fn rim(&self, parted: &Parted) -> Option<RoundOpening> {
+    fn rim(&self, parted: &SegmentedMesh) -> Option<RoundOpening> {
         if self.corners.len() < LEAST_CORNERS {
             return None;
         }
@@ -290,7 +298,7 @@ impl Loop {
         })
     }
 
-    fn faces_out(&self, parted: &Parted, out: &Vector3<f64>) -> bool {
+    fn faces_out(&self, parted: &SegmentedMesh, out: &Vector3<f64>) -> bool {
         let facing = self.edges().zip(&self.faces).map(|((a, b), &face)| {
             let is_facing = parted.facets.normal(face).dot(out) > FACING;
             if is_facing { (b - a).norm() } else { 0.0 }
@@ -300,7 +308,7 @@ impl Loop {
 
     fn circle(
         &self,
-        parted: &Parted,
+        parted: &SegmentedMesh,
         middle: &Point3<f64>,
         out: &Vector3<f64>,
     ) -> Option<Fit<Cylinder>> {

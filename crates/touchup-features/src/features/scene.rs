@@ -15,7 +15,7 @@ use touchup_geometry::mesh::{FaceTree, TriMesh, VertexId};
 use touchup_geometry::numeric::tangent_basis;
 
 /// A segmented mesh.
-pub(super) struct Parted<'a> {
+pub(super) struct SegmentedMesh<'a> {
     pub facets: Facets<'a>,
     pub tree: &'a FaceTree,
     pub bodies: Bodies,
@@ -87,7 +87,7 @@ pub(super) fn numbered_by_place(mesh: &TriMesh) -> TriMesh {
     TriMesh::new(positions, faces).expect("it was sound under its other numbers")
 }
 
-impl<'a> Parted<'a> {
+impl<'a> SegmentedMesh<'a> {
     pub fn of(mesh: &'a TriMesh, tree: &'a FaceTree) -> Self {
         let facets = Facets::of(mesh);
         let scale = MeshScale::of(&facets);

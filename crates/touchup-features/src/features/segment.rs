@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::facets::{Facets, NONE};
-use super::fit::Surface;
+use super::fit::SurfaceModel;
 use super::marks::sort;
 use super::primitive::{Primitive, belongs, plane_of};
 use touchup_geometry::numeric::{DisjointSets, distinct};

@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Point3, Vector3};
 
 use super::borders::Borders;
 use super::feature::FittedTo;
-use super::fit::{Plane, Surface};
+use super::fit::{Plane, SurfaceModel};
 use super::measure::Measure;
 use super::primitive::{FACES_ALIKE, Primitive};
 use super::segment::Segment;

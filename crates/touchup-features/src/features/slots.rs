@@ -6,10 +6,10 @@ use nalgebra::{Point3, Vector3};
 
 use super::borders::{Borders, is_convex};
 use super::facets::NONE;
-use super::fit::{Ends, Plane, Surface};
+use super::fit::{Ends, Plane, SurfaceModel};
 use super::primitive::Primitive;
 use super::rays::RayHit;
-use super::scene::Parted;
+use super::scene::SegmentedMesh;
 use super::walls::Wall;
 use touchup_geometry::numeric::{mean, without_repeats};
 
@@ -121,7 +121,7 @@ const MOST_MET: usize = 8;
 ///
 /// - `of_face`: the segment of each face, seams included.
 pub(super) fn slots(
-    parted: &Parted,
+    parted: &SegmentedMesh,
     walls: &[Wall],
     of_face: &[u32],
     borders: &Borders,
@@ -159,7 +159,7 @@ pub(super) fn slots(
 }
 
 /// Slots with both half-round ends: the walls between may be in pieces, or hardly there.
-fn between_round_ends(parted: &Parted, of_face: &[u32], walls: &[Wall]) -> Vec<Slot> {
+fn between_round_ends(parted: &SegmentedMesh, of_face: &[u32], walls: &[Wall]) -> Vec<Slot> {
     let is_end =
         |wall: &&Wall| wall.is_concave && !wall.is_cone() && END_TURN.contains(&wall.coverage);
     let ends: Vec<&Wall> = walls.iter().filter(is_end).collect();
@@ -174,7 +174,7 @@ fn between_round_ends(parted: &Parted, of_face: &[u32], walls: &[Wall]) -> Vec<S
 
 /// The slot between two half-round walls, each open towards the other.
 #[expect(clippy::too_many_lines)]
-fn slot_of_ends(parted: &Parted, of_face: &[u32], ends: [&Wall; 2]) -> Option<Slot> {
+fn slot_of_ends(parted: &SegmentedMesh, of_face: &[u32], ends: [&Wall; 2]) -> Option<Slot> {
     let [one, other] = ends;
     let width = one.radius() + other.radius();
     let axis = one.axis;
@@ -297,14 +297,14 @@ fn is_same_slot(one: &Slot, other: &Slot) -> bool {
 }
 
 /// Faces across from a point of a wall.
-struct View {
+struct OppositeFaces {
     from: Point3<f64>,
     /// faces on the line along the normal: distance, m, and segment; up to the first beyond the
     /// wall itself, however wide the void
     met: Vec<(f64, u32)>,
 }
 
-impl View {
+impl OppositeFaces {
     /// The first segment across a void of `width`.
     fn across(&self, width: f64) -> Option<u32> {
         let &(distance, segment) = self
@@ -316,7 +316,12 @@ impl View {
 }
 
 /// Views from the points of a wall, computed once: many other walls may face it.
-fn views(parted: &Parted, of_face: &[u32], wall: usize, normal: &Vector3<f64>) -> Vec<View> {
+fn views(
+    parted: &SegmentedMesh,
+    of_face: &[u32],
+    wall: usize,
+    normal: &Vector3<f64>,
+) -> Vec<OppositeFaces> {
     let mut rays = parted.around(wall).rays(parted.diagonal / PIECES);
     let farthest = FARTHEST * parted.diagonal;
     let mut view = |from: Point3<f64>| {
@@ -332,7 +337,7 @@ fn views(parted: &Parted, of_face: &[u32], wall: usize, normal: &Vector3<f64>) -
             met.push((at + hit.distance, of_face[hit.face.0 as usize]));
             at += hit.distance + APART * parted.diagonal;
         }
-        View { from, met }
+        OppositeFaces { from, met }
     };
     samples(parted, wall).into_iter().map(&mut view).collect()
 }
@@ -341,10 +346,10 @@ fn views(parted: &Parted, of_face: &[u32], wall: usize, normal: &Vector3<f64>) -
 ///
 /// - `seen`: views of the walls until now.
 fn between(
-    parted: &Parted,
+    parted: &SegmentedMesh,
     of_face: &[u32],
     borders: &Borders,
-    seen: &mut BTreeMap<usize, Vec<View>>,
+    seen: &mut BTreeMap<usize, Vec<OppositeFaces>>,
     walls: [usize; 2],
 ) -> Option<(Slot, f64)> {
     let planes = [parted.plane(walls[0])?, parted.plane(walls[1])?];
@@ -380,7 +385,7 @@ fn between(
         opened(
             parted,
             of_face,
-            &Opened {
+            &SlotCandidate {
                 walls,
                 middle,
                 across: n,
@@ -402,7 +407,7 @@ fn between(
 }
 
 /// Points of a segment, spread over its faces.
-pub(super) fn samples(parted: &Parted, number: usize) -> Vec<Point3<f64>> {
+pub(super) fn samples(parted: &SegmentedMesh, number: usize) -> Vec<Point3<f64>> {
     let faces = &parted.segment(number).faces;
     let step = faces.len().div_ceil(SAMPLES).max(1);
     let each = (SAMPLES / faces.len().max(1)).clamp(1, 16);
@@ -428,7 +433,7 @@ pub(super) fn samples(parted: &Parted, number: usize) -> Vec<Point3<f64>> {
 /// Planes and cylinders around an opening: they fall away from one of the walls, square to both.
 /// With the outward direction at the middle of the void.
 fn lands(
-    parted: &Parted,
+    parted: &SegmentedMesh,
     borders: &Borders,
     walls: [usize; 2],
     middle: &Point3<f64>,
@@ -454,8 +459,8 @@ fn lands(
     lands
 }
 
-/// Two walls, seen from one of the planes around them.
-struct Opened {
+/// Two walls that may bound a slot, seen from one of the planes around them.
+struct SlotCandidate {
     walls: [usize; 2],
     middle: Point3<f64>,
     across: Vector3<f64>,
@@ -466,8 +471,8 @@ struct Opened {
 }
 
 #[expect(clippy::too_many_lines)]
-fn opened(parted: &Parted, of_face: &[u32], seen: &Opened) -> Option<Slot> {
-    let Opened {
+fn opened(parted: &SegmentedMesh, of_face: &[u32], seen: &SlotCandidate) -> Option<Slot> {
+    let SlotCandidate {
         walls,
         middle,
         across,
@@ -561,7 +566,7 @@ fn opened(parted: &Parted, of_face: &[u32], seen: &Opened) -> Option<Slot> {
 }
 
 /// Whether a segment is a plane square to `along`.
-fn is_square(parted: &Parted, number: usize, along: &Vector3<f64>) -> bool {
+fn is_square(parted: &SegmentedMesh, number: usize, along: &Vector3<f64>) -> bool {
     parted
         .plane(number)
         .is_some_and(|plane| plane.normal().dot(along).abs() > PARALLEL.powi(4))
@@ -569,7 +574,7 @@ fn is_square(parted: &Parted, number: usize, along: &Vector3<f64>) -> bool {
 
 /// Whether a segment is an upright wall that `along` meets aslant.
 fn is_wall_aslant(
-    parted: &Parted,
+    parted: &SegmentedMesh,
     number: usize,
     along: &Vector3<f64>,
     out: &Vector3<f64>,
@@ -583,7 +588,7 @@ fn is_wall_aslant(
 /// The half-round end about a point: with few touches the wall may be in pieces, and the line may
 /// meet another.
 fn round_end_about(
-    parted: &Parted,
+    parted: &SegmentedMesh,
     middle: &Point3<f64>,
     out: &Vector3<f64>,
     width: f64,
@@ -600,7 +605,7 @@ fn round_end_about(
 }
 
 /// Whether a segment is a half-round end of a slot.
-fn is_round_end(parted: &Parted, number: usize, out: &Vector3<f64>, width: f64) -> bool {
+fn is_round_end(parted: &SegmentedMesh, number: usize, out: &Vector3<f64>, width: f64) -> bool {
     let Primitive::Cylinder(end) = parted.segment(number).primitive else {
         return false;
     };

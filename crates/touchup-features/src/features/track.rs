@@ -7,8 +7,8 @@
 use nalgebra::Vector3;
 
 use super::detect::{Detection, detect};
-use super::feature::{Feature, FittedTo, Kind, Measured, Walls};
-use super::fit::{Cylinder, Fit, FitParams, Freedom, Stadium, Surface, fit};
+use super::feature::{Feature, FeatureKind, FittedTo, MeasuredValue, Walls};
+use super::fit::{Cylinder, Fit, FitParams, Freedom, Stadium, SurfaceModel, fit};
 use super::from_fits::{Touches, axis_of, number};
 use super::observe::{groups, observation, systematic};
 use touchup_geometry::mesh::TriMesh;
@@ -140,13 +140,13 @@ fn is_same(one: &Feature, other: &Feature) -> bool {
     let off = one.centre.value - other.centre.value;
     // the same hole may have become deeper
     let off = match (one.kind, &one.axis) {
-        (Kind::Hole | Kind::Boss | Kind::Cylinder, Some(axis)) => {
+        (FeatureKind::Hole | FeatureKind::Boss | FeatureKind::Cylinder, Some(axis)) => {
             off - axis.value * off.dot(&axis.value)
         }
         _ => off,
     };
     let (a, b) = (size(one), size(other));
-    let is_as_large = one.kind == Kind::Plane || (a - b).abs() < SAME_PLACE * a.max(b);
+    let is_as_large = one.kind == FeatureKind::Plane || (a - b).abs() < SAME_PLACE * a.max(b);
     one.kind == other.kind && is_alike && is_as_large && off.norm() < SAME_PLACE * a.max(b)
 }
 
@@ -168,9 +168,9 @@ fn is_on(feature: &Feature, touch: &ProbedPoint) -> bool {
     let along = (touch.point - feature.centre.value).dot(&axis.value);
     // a hole lies below its opening, a boss rises from its foot
     let is_between = match feature.kind {
-        Kind::Boss => along > 0.0 && along < height + reach,
-        Kind::Cylinder if feature.depth.is_none() => along.abs() < half_length,
-        Kind::Cylinder => along > 0.0 && along < height,
+        FeatureKind::Boss => along > 0.0 && along < height + reach,
+        FeatureKind::Cylinder if feature.depth.is_none() => along.abs() < half_length,
+        FeatureKind::Cylinder => along > 0.0 && along < height,
         _ => along < 0.0 && along > -height - reach,
     };
     let far =
@@ -231,7 +231,7 @@ impl Feature {
 
     fn is_round(&mut self, found: &Fit<Cylinder>, touches: &Touches) {
         let centre = found.surface.nearest_on_axis(&self.centre.value);
-        self.centre = Measured::new(centre, found.lateral_std(&centre), touches.clone());
+        self.centre = MeasuredValue::new(centre, found.lateral_std(&centre), touches.clone());
         self.axis = Some(self.turned(found, touches));
         self.diameter = Some(number(
             found,
@@ -270,13 +270,17 @@ impl Feature {
             off.dot(&direction)
         };
         let value = start + axis * off.dot(&axis) + direction * along;
-        self.centre = Measured::new(value, found.middle_std(), touches.clone());
+        self.centre = MeasuredValue::new(value, found.middle_std(), touches.clone());
         self.axis = Some(self.turned(found, touches));
         self.walls = Some(Walls::Slot(found.surface));
     }
 
     /// Direction of a fit, with the sign of the axis.
-    fn turned<S: Surface>(&self, found: &Fit<S>, touches: &Touches) -> Measured<Vector3<f64>> {
+    fn turned<S: SurfaceModel>(
+        &self,
+        found: &Fit<S>,
+        touches: &Touches,
+    ) -> MeasuredValue<Vector3<f64>> {
         axis_of(
             found,
             &self

@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 use nalgebra::{Point3, Vector3};
 
 use super::facets::Facets;
-use super::fit::Surface;
+use super::fit::SurfaceModel;
 use super::primitive::Primitive;
 use super::segment::Segmentation;
 use touchup_geometry::numeric::{median, tangent_basis};

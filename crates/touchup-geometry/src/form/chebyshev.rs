@@ -24,7 +24,7 @@ const TURN: f64 = 1e-10;
 
 /// One inequality g·y ≥ h of the basis.
 #[derive(Clone, Copy)]
-struct Bounded<const N: usize> {
+struct Inequality<const N: usize> {
     row: SVector<f64, N>,
     least: f64,
 }
@@ -61,7 +61,7 @@ pub(super) fn chebyshev<const N: usize>(
             column(j).max(f64::MIN_POSITIVE)
         }
     });
-    let upper = |i: usize| Bounded {
+    let upper = |i: usize| Inequality {
         row: SVector::from_fn(|j, _| {
             if j == last {
                 1.0
@@ -72,8 +72,8 @@ pub(super) fn chebyshev<const N: usize>(
         least: values[i] / largest,
     };
     let lower = |i: usize| {
-        let Bounded { row, least } = upper(i);
-        Bounded {
+        let Inequality { row, least } = upper(i);
+        Inequality {
             row: SVector::from_fn(|j, _| if j == last { 1.0 } else { -row[j] }),
             least: -least,
         }
@@ -87,12 +87,12 @@ pub(super) fn chebyshev<const N: usize>(
         }
     });
     let first = upper(0);
-    let mut basis: [Bounded<N>; N] = std::array::from_fn(|j| {
+    let mut basis: [Inequality<N>; N] = std::array::from_fn(|j| {
         if j == last {
             return first;
         }
         let side = (aim[j] - first.row[j]).signum();
-        Bounded {
+        Inequality {
             row: SVector::from_fn(|k, _| if k == j { side } else { 0.0 }),
             least: -BOUND,
         }

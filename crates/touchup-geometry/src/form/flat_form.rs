@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use nalgebra::{Matrix2, Point3, SVector, SymmetricEigen, Vector2, Vector3};
 
-use super::profile::{FormPoint, Profile, Row};
+use super::profile::{DesignRow, FormPoint, Profile};
 use super::round_form::Deviation;
 use super::zone::linear_zone;
 use crate::numeric::tangent_basis;
@@ -78,13 +78,13 @@ pub fn flat_form(
     let unit =
         |q: &[f64; 2]| [0, 1].map(|i| ((q[i] - ranges[i][0]) / ranges[i][1]).clamp(-1.0, 1.0));
     let places: Vec<[f64; 2]> = local.iter().map(unit).collect();
-    let row = |(p, place): (&FormPoint, &[f64; 2])| Row {
+    let row = |(p, place): (&FormPoint, &[f64; 2])| DesignRow {
         terms: terms(*place),
         value: normal.dot(&(p.point - on_plane)),
         sigma: p.sigma,
         group: p.group,
     };
-    let rows: Vec<Row> = points.iter().zip(&places).map(row).collect();
+    let rows: Vec<DesignRow> = points.iter().zip(&places).map(row).collect();
     let count = terms([0.0; 2]).len();
     let blocks: Vec<Range<usize>> = (REFERENCE..count).map(|term| term..term + 1).collect();
     let profile = Profile::of(&rows, REFERENCE, blocks)?;

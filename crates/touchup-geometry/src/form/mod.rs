@@ -19,7 +19,7 @@ pub use element::{Element, Shape};
 pub use flat_form::{FlatForm, flat_form};
 pub use profile::{Estimate, FormPoint};
 pub use relation::{
-    Orientation, angle, coaxiality, concentricity, distance, orientation, position,
+    OrientationDeviation, angle, coaxiality, concentricity, distance, orientation, position,
 };
 pub use round_form::{Deviation, RoundForm, round_form};
 pub use zone::{Zone, axis_straightness, cylindricity, flatness, roundness, straightness};

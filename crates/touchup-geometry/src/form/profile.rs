@@ -36,7 +36,7 @@ pub struct FormPoint {
 }
 
 /// A deviation and the contribution of each term at its place.
-pub(super) struct Row {
+pub(super) struct DesignRow {
     pub terms: Vec<f64>,
     /// m
     pub value: f64,
@@ -82,8 +82,8 @@ pub(super) struct Profile {
 }
 
 /// Rows with their weights, which groups share.
-struct Weighted<'a> {
-    rows: &'a [Row],
+struct WeightedRows<'a> {
+    rows: &'a [DesignRow],
     /// 1/m²
     weights: Vec<f64>,
     /// group of each row, from 0
@@ -91,10 +91,10 @@ struct Weighted<'a> {
     groups: usize,
 }
 
-impl<'a> Weighted<'a> {
+impl<'a> WeightedRows<'a> {
     /// - `count`: number of terms of each row.
     /// - returns: `None` if a number is not finite, or a standard deviation is not positive.
-    fn of(rows: &'a [Row], count: usize) -> Option<Self> {
+    fn of(rows: &'a [DesignRow], count: usize) -> Option<Self> {
         let names = distinct(rows.iter().map(|row| row.group));
         let group: Vec<usize> = rows
             .iter()
@@ -102,10 +102,10 @@ impl<'a> Weighted<'a> {
             .collect();
         let mut in_group = vec![0.0; names.len()];
         group.iter().for_each(|&g| in_group[g] += 1.0);
-        let weight = |(row, &g): (&Row, &usize)| 1.0 / (row.sigma * row.sigma * in_group[g]);
+        let weight = |(row, &g): (&DesignRow, &usize)| 1.0 / (row.sigma * row.sigma * in_group[g]);
         let weights: Vec<f64> = rows.iter().zip(&group).map(weight).collect();
         let is_finite =
-            |row: &Row| row.value.is_finite() && row.terms.iter().all(|x| x.is_finite());
+            |row: &DesignRow| row.value.is_finite() && row.terms.iter().all(|x| x.is_finite());
         let is_sound = rows
             .iter()
             .all(|row| row.terms.len() == count && is_finite(row))
@@ -119,7 +119,7 @@ impl<'a> Weighted<'a> {
     }
 
     /// Variance of the errors over the stated one, by the residuals of the groups.
-    fn excess(&self, choice: &Choice, solution: &DVector<f64>) -> f64 {
+    fn excess(&self, choice: &TermSelection, solution: &DVector<f64>) -> f64 {
         let (mut of_group, mut weight_of_group) = (vec![0.0; self.groups], vec![0.0; self.groups]);
         for ((row, &w), &g) in self.rows.iter().zip(&self.weights).zip(&self.group) {
             let fitted: f64 = choice
@@ -148,20 +148,20 @@ impl<'a> Weighted<'a> {
 
 /// Some terms and the inverse of their information.
 #[derive(Clone)]
-struct Choice {
+struct TermSelection {
     terms: Vec<usize>,
     inverse: DMatrix<f64>,
 }
 
 /// Contribution of a block to a choice.
-struct Own {
+struct BlockContribution {
     information: DMatrix<f64>,
     right: DVector<f64>,
     /// least share of a term outside of the terms of the choice
     share: f64,
 }
 
-impl Own {
+impl BlockContribution {
     /// Decrease of the squares of the residuals by the block.
     fn gain(&self) -> f64 {
         self.information
@@ -179,7 +179,7 @@ struct Sums {
 }
 
 impl Sums {
-    fn of(weighted: &Weighted, count: usize) -> Self {
+    fn of(weighted: &WeightedRows, count: usize) -> Self {
         let (information, right) = (DMatrix::zeros(count, count), DVector::zeros(count));
         let mut sums = Self {
             information,
@@ -194,7 +194,7 @@ impl Sums {
         sums
     }
 
-    fn choice(&self, terms: Vec<usize>) -> Option<Choice> {
+    fn choice(&self, terms: Vec<usize>) -> Option<TermSelection> {
         let count = terms.len();
         let entry = |i: usize, j: usize| self.information[(terms[i], terms[j])];
         let scale = DVector::from_fn(count, |i, _| {
@@ -202,23 +202,23 @@ impl Sums {
         });
         let scaled = DMatrix::from_fn(count, count, |i, j| entry(i, j) * scale[i] * scale[j]);
         let inverse = scaled.cholesky()?.inverse();
-        Some(Choice {
+        Some(TermSelection {
             terms,
             inverse: DMatrix::from_fn(count, count, |i, j| inverse[(i, j)] * scale[i] * scale[j]),
         })
     }
 
     /// A choice and a block.
-    fn with(&self, choice: &Choice, block: &Range<usize>) -> Option<Choice> {
+    fn with(&self, choice: &TermSelection, block: &Range<usize>) -> Option<TermSelection> {
         self.choice(choice.terms.iter().copied().chain(block.clone()).collect())
     }
 
-    fn solution(&self, Choice { terms, inverse }: &Choice) -> DVector<f64> {
+    fn solution(&self, TermSelection { terms, inverse }: &TermSelection) -> DVector<f64> {
         inverse * DVector::from_fn(terms.len(), |i, _| self.right[terms[i]])
     }
 
     /// Squares of the values less the squares of the residuals.
-    fn explained(&self, choice: &Choice) -> f64 {
+    fn explained(&self, choice: &TermSelection) -> f64 {
         choice
             .terms
             .iter()
@@ -227,8 +227,8 @@ impl Sums {
             .sum()
     }
 
-    fn own(&self, block: &Range<usize>, choice: &Choice) -> Own {
-        let Choice { terms, inverse } = choice;
+    fn own(&self, block: &Range<usize>, choice: &TermSelection) -> BlockContribution {
+        let TermSelection { terms, inverse } = choice;
         let between = DMatrix::from_fn(terms.len(), block.len(), |i, j| {
             self.information[(terms[i], block.start + j)]
         });
@@ -241,7 +241,7 @@ impl Sums {
             self.right.rows(block.start, block.len()) - between.tr_mul(&self.solution(choice));
         let share = |j: usize| information[(j, j)] / inside[(j, j)].max(f64::MIN_POSITIVE);
         let share = (0..block.len()).map(share).fold(1.0, f64::min);
-        Own {
+        BlockContribution {
             information,
             right,
             share,
@@ -249,8 +249,8 @@ impl Sums {
     }
 
     /// The terms of the reference that the points determine.
-    fn reference(&self, count: usize) -> Option<Choice> {
-        let mut choice = Choice {
+    fn reference(&self, count: usize) -> Option<TermSelection> {
+        let mut choice = TermSelection {
             terms: Vec::new(),
             inverse: DMatrix::zeros(0, 0),
         };
@@ -268,9 +268,9 @@ impl Sums {
     fn sought(
         &self,
         blocks: &[Range<usize>],
-        reference: &Choice,
+        reference: &TermSelection,
         groups: usize,
-    ) -> Option<(Vec<usize>, Choice)> {
+    ) -> Option<(Vec<usize>, TermSelection)> {
         let first = blocks.first().map_or(0, |block| block.start);
         let is_carried =
             |block: &Range<usize>| groups >= first + GROUPS_PER_TERM * (block.end - first);
@@ -297,9 +297,9 @@ impl Sums {
         &self,
         blocks: &[Range<usize>],
         sought: &[usize],
-        reference: &Choice,
+        reference: &TermSelection,
         excess: f64,
-    ) -> Option<(Vec<usize>, Choice)> {
+    ) -> Option<(Vec<usize>, TermSelection)> {
         let (mut choice, mut found) = (reference.clone(), Vec::new());
         loop {
             let rest = sought.iter().filter(|number| !found.contains(*number));
@@ -338,10 +338,10 @@ impl Profile {
     /// - `blocks`: terms found together or not at all, behind the reference, the longest
     ///   undulations first.
     /// - returns: `None` if the points do not determine the reference.
-    pub fn of(rows: &[Row], reference: usize, blocks: Vec<Range<usize>>) -> Option<Self> {
+    pub fn of(rows: &[DesignRow], reference: usize, blocks: Vec<Range<usize>>) -> Option<Self> {
         let count = blocks.last().map_or(reference, |last| last.end);
         let weighted =
-            Weighted::of(rows, count).filter(|weighted| weighted.groups >= reference + 2)?;
+            WeightedRows::of(rows, count).filter(|weighted| weighted.groups >= reference + 2)?;
         let sums = Sums::of(&weighted, count);
         let reference = sums.reference(reference)?;
         let (sought, all) = sums.sought(&blocks, &reference, weighted.groups)?;

@@ -83,7 +83,7 @@ fn is_parallelism(a: Shape, b: Shape, is_aligned: bool) -> bool {
 
 /// A deviation of orientation.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Orientation {
+pub struct OrientationDeviation {
     /// whether the features are nominally parallel, and not perpendicular
     pub is_parallel: bool,
     /// width of the zone between parallel planes, or diameter of the cylinder, that encloses the
@@ -98,7 +98,7 @@ pub struct Orientation {
 /// Nominally equal directions deviate in two components, and the zone is as wide as the extent
 /// along the worse (for a toleranced axis: a cylinder). Nominally square ones deviate in one, and
 /// may turn about the other.
-pub fn orientation(toleranced: &Element, datum: &Element) -> Option<Orientation> {
+pub fn orientation(toleranced: &Element, datum: &Element) -> Option<OrientationDeviation> {
     let is_aligned =
         toleranced.direction.dot(&datum.direction).abs() > std::f64::consts::FRAC_1_SQRT_2;
     let off = |e: &[Element]| {
@@ -125,7 +125,7 @@ pub fn orientation(toleranced: &Element, datum: &Element) -> Option<Orientation>
             }
         })
     };
-    Some(Orientation {
+    Some(OrientationDeviation {
         is_parallel: is_parallelism(toleranced.shape, datum.shape, is_aligned),
         zone: size(&[toleranced, datum], zone)?,
         off: size(&[toleranced, datum], off)?,

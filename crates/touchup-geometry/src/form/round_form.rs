@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use nalgebra::{Point2, Point3, SVector, Vector3};
 
-use super::profile::{Estimate, FormPoint, Profile, Row};
+use super::profile::{DesignRow, Estimate, FormPoint, Profile};
 use super::zone::{self, axis_straightness, linear_zone};
 use crate::numeric::{order_statistic, tangent_basis};
 
@@ -165,7 +165,7 @@ fn rows_of(
     on_axis: &Point3<f64>,
     axis: &Vector3<f64>,
     radius: f64,
-) -> (Vec<Row>, Vec<[f64; 2]>, bool) {
+) -> (Vec<DesignRow>, Vec<[f64; 2]>, bool) {
     let [u, v] = tangent_basis(axis);
     let along = |p: &FormPoint| axis.dot(&(p.point - on_axis));
     let (low, high) = points
@@ -185,7 +185,7 @@ fn rows_of(
         let angle = y.atan2(x);
         let value = x.hypot(y) - radius;
         (
-            Row {
+            DesignRow {
                 terms: terms(all, angle, height),
                 value,
                 sigma: p.sigma,

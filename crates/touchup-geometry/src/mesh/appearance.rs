@@ -168,7 +168,7 @@ fn at_point(mesh: &TriMesh, texture: &Texture, face: FaceId, point: &Point3<f64>
 
 #[cfg(test)]
 mod tests {
-    use super::super::Alone;
+    use super::super::SerialWorkers;
     use super::*;
 
     /// A roof over x = 0 … 4 with its ridge at x = 2, two triangles a side; the second side uses
@@ -215,7 +215,7 @@ mod tests {
     #[test]
     fn a_new_vertex_has_the_colour_of_the_nearest_one() {
         let places = [[0.1, 0.2, 0.5], [2.0, 1.9, 3.0], [4.0, 2.0, 0.0]].map(Point3::from);
-        let colours = appearance().colours_at(&places, &Alone).unwrap();
+        let colours = appearance().colours_at(&places, &SerialWorkers).unwrap();
         assert_eq!(
             colours,
             VertexColours::Rgb(vec![[0, 0, 100], [3, 30, 100], [5, 50, 100]])
@@ -231,7 +231,7 @@ mod tests {
         let mut expected = texture.clone();
         expected.corners[1].rotate_left(1);
         assert_eq!(
-            appearance().texture_on(&mesh, &positions, &Alone),
+            appearance().texture_on(&mesh, &positions, &SerialWorkers),
             Some(expected)
         );
     }
@@ -247,7 +247,9 @@ mod tests {
         ]
         .map(Point3::from);
         let mesh = TriMesh::new(places.to_vec(), vec![[0, 1, 2], [1, 3, 2]]).unwrap();
-        let texture = appearance().texture_on(&mesh, &places, &Alone).unwrap();
+        let texture = appearance()
+            .texture_on(&mesh, &places, &SerialWorkers)
+            .unwrap();
         assert_eq!(texture.shown, [7, 7]);
         let by_hand =
             [[0.5, 0.5], [1.8, 0.5], [1.8, 1.9]].map(|place: [f32; 2]| place.map(|x| x / 16.0));
@@ -275,12 +277,12 @@ mod tests {
             None,
             None,
         );
-        assert_eq!(plain.colours_at(&positions, &Alone), None);
+        assert_eq!(plain.colours_at(&positions, &SerialWorkers), None);
         assert_eq!(
             plain.texture_on(
                 &TriMesh::new(positions.clone(), faces).unwrap(),
                 &positions,
-                &Alone
+                &SerialWorkers
             ),
             None
         );

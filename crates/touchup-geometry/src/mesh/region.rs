@@ -40,7 +40,7 @@ impl Region {
 
 /// The rest of a mesh after a cut: faces without adjacency, bit by bit as before.
 #[derive(Clone, Debug)]
-pub struct Outside {
+pub struct MeshRemainder {
     /// of the vertices outside the part, m, in order of id
     positions: Vec<Point3<f64>>,
     /// id in the whole of each vertex of the part, rising
@@ -57,14 +57,14 @@ pub struct Outside {
 
 /// A whole mesh made of its rest and the part cut from it.
 #[derive(Clone, Debug)]
-pub struct Sewn {
+pub struct SewnMesh {
     /// the whole: vertices and faces keep their order, new ones come last
     pub mesh: TriMesh,
     /// vertex in the whole of each vertex slot of the part
     pub vertices: Vec<VertexId>,
 }
 
-impl Sewn {
+impl SewnMesh {
     /// Values of the vertices of the part as values of the vertices of the whole.
     ///
     /// - `outside`: value of vertices outside the part.
@@ -84,8 +84,8 @@ impl TriMesh {
     /// Splits off the faces that reach into `region`, with all their corners, as a mesh of its own.
     ///
     /// The part has all faces around a vertex in `region`. Vertices on its rim lie outside `region`
-    /// and must not move, or [`Outside::sew_to`] fails.
-    pub fn cut(&self, region: &Region) -> (TriMesh, Outside) {
+    /// and must not move, or [`MeshRemainder::sew_to`] fails.
+    pub fn cut(&self, region: &Region) -> (TriMesh, MeshRemainder) {
         let mut ids = vec![NOT_IN; self.vertex_slots()];
         let (mut inside, mut places, mut faces) = (Vec::new(), Vec::new(), Vec::new());
         for (place, (face, corners)) in self.faces().enumerate() {
@@ -118,7 +118,7 @@ impl TriMesh {
         let (rim, rim_edges) = rim_of(&part, &faces, &ids);
         (
             part,
-            Outside {
+            MeshRemainder {
                 positions,
                 vertices,
                 faces,
@@ -160,7 +160,7 @@ fn rim_of(part: &TriMesh, faces: &[[u32; 3]], ids: &[u32]) -> (Vec<RimVertex>, V
     (vertices, distinct(edges))
 }
 
-impl Outside {
+impl MeshRemainder {
     /// Number of faces.
     pub fn face_count(&self) -> usize {
         self.faces.len()
@@ -179,7 +179,7 @@ impl Outside {
     ///
     /// # Errors
     /// [`MeshError::TornRim`] if that reached the rim, [`MeshError::TooMany`].
-    pub fn sew_to(&self, part: &TriMesh) -> Result<Sewn, MeshError> {
+    pub fn sew_to(&self, part: &TriMesh) -> Result<SewnMesh, MeshError> {
         let is_as_it_was = |&(vertex, p): &(VertexId, Point3<f64>)| {
             part.has_vertex(vertex) && part.position(vertex) == p
         };
@@ -210,7 +210,7 @@ impl Outside {
             positions[vertex.0 as usize] = *p;
         }
         let faces = self.all_faces(part, |vertex| vertices[vertex.0 as usize].0);
-        Ok(Sewn {
+        Ok(SewnMesh {
             mesh: TriMesh::new(positions, faces)?,
             vertices,
         })

@@ -22,7 +22,7 @@ const FLAT: f64 = 0.02;
 
 /// A coarse mesh in place of a fine one.
 #[derive(Clone, Debug)]
-pub struct Simplified {
+pub struct SimplifiedMesh {
     /// the simplified mesh, m, in O
     pub mesh: TriMesh,
     /// vertex of `mesh` for each vertex slot of the original
@@ -31,7 +31,7 @@ pub struct Simplified {
 
 /// Sums over a cell.
 #[derive(Clone, Copy, Debug, Default)]
-struct Cell {
+struct CellSums {
     sum: Vector3<f64>,
     count: f64,
     rim_sum: Vector3<f64>,
@@ -42,7 +42,7 @@ struct Cell {
     offsets: Vector3<f64>,
 }
 
-impl Simplified {
+impl SimplifiedMesh {
     /// Simplifies `mesh` to edges of about `edge` (m) in its finer parts. O(V edge² / (its own
     /// edges)² + F).
     ///
@@ -51,7 +51,7 @@ impl Simplified {
     pub fn new(mesh: &TriMesh, edge: f64) -> Result<Self, MeshError> {
         let spacing = edge / EDGE_OF_SPACING;
         let (cells, seeds) = cells_of(mesh, spacing);
-        let mut made: Vec<Cell> = vec![Cell::default(); seeds.len()];
+        let mut made: Vec<CellSums> = vec![CellSums::default(); seeds.len()];
         for (vertex, &cell) in cells.iter().enumerate().filter(|(_, cell)| **cell != NONE) {
             let arm = mesh.positions()[vertex] - seeds[cell as usize];
             let cell = &mut made[cell as usize];
@@ -232,7 +232,7 @@ impl Simplified {
     }
 }
 
-impl Cell {
+impl CellSums {
     /// Place of the cell's vertex relative to the seed, m: the mean of its rim, else the best
     /// meeting point of the planes of its faces, with the mean in directions left open.
     fn place(&self, spacing: f64) -> Vector3<f64> {

@@ -1,7 +1,7 @@
 //! Work in independent pieces: pure code lists the pieces, its caller decides how they run.
 
 /// A piece of work.
-pub type Job<'a> = Box<dyn FnOnce() + Send + 'a>;
+pub type Task<'a> = Box<dyn FnOnce() + Send + 'a>;
 
 /// Runs independent pieces of work. The results depend neither on the threads nor on the order.
 pub trait Workers: Sync {
@@ -9,19 +9,19 @@ pub trait Workers: Sync {
     fn count(&self) -> usize;
 
     /// Completes all pieces before it returns.
-    fn run(&self, jobs: Vec<Job<'_>>);
+    fn run(&self, jobs: Vec<Task<'_>>);
 }
 
 /// One piece after the other, in the calling thread.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Alone;
+pub struct SerialWorkers;
 
-impl Workers for Alone {
+impl Workers for SerialWorkers {
     fn count(&self) -> usize {
         1
     }
 
-    fn run(&self, jobs: Vec<Job<'_>>) {
+    fn run(&self, jobs: Vec<Task<'_>>) {
         jobs.into_iter().for_each(|job| job());
     }
 }
@@ -54,7 +54,7 @@ pub fn map_pieces_by<T: Send>(
     let each = &each;
     let jobs = parts.iter_mut().enumerate().map(|(at, part)| {
         let own = (at * size).min(count)..((at + 1) * size).min(count);
-        Box::new(move || part.extend(own.map(each))) as Job<'_>
+        Box::new(move || part.extend(own.map(each))) as Task<'_>
     });
     workers.run(jobs.collect());
     parts.into_iter().flatten().collect()
@@ -62,15 +62,15 @@ pub fn map_pieces_by<T: Send>(
 
 /// For tests: as if `self.0` pieces ran at the same time, the last one first.
 #[cfg(test)]
-pub(in crate::mesh) struct Backwards(pub usize);
+pub(in crate::mesh) struct ReversedWorkers(pub usize);
 
 #[cfg(test)]
-impl Workers for Backwards {
+impl Workers for ReversedWorkers {
     fn count(&self) -> usize {
         self.0
     }
 
-    fn run(&self, jobs: Vec<Job<'_>>) {
+    fn run(&self, jobs: Vec<Task<'_>>) {
         jobs.into_iter().rev().for_each(|job| job());
     }
 }
@@ -85,12 +85,12 @@ mod tests {
             let by_hand: Vec<usize> = (0..count).map(|i| i * i).collect();
             for workers in 1..6 {
                 assert_eq!(
-                    map_by(&Backwards(workers), count, |i| i * i),
+                    map_by(&ReversedWorkers(workers), count, |i| i * i),
                     by_hand,
                     "{count} by {workers}"
                 );
             }
-            assert_eq!(map_by(&Alone, count, |i| i * i), by_hand);
+            assert_eq!(map_by(&SerialWorkers, count, |i| i * i), by_hand);
         }
     }
 }

@@ -36,7 +36,7 @@ pub struct Alignment {
 
 /// A feature of the drawing, by its number, and its measured counterpart.
 #[derive(Clone, PartialEq)]
-struct Matched {
+struct MatchedFeature {
     drawn: usize,
     pair: DatumPair,
     id: u32,
@@ -152,7 +152,7 @@ fn matched(
     measured: &[Feature],
     motion: &Isometry3<f64>,
     reach: f64,
-) -> Vec<Result<Matched, String>> {
+) -> Vec<Result<MatchedFeature, String>> {
     let place = |feature: &Feature| {
         let place = FeaturePlace::of(feature);
         FeaturePlace {
@@ -184,7 +184,7 @@ fn matched(
 }
 
 /// Both as a pair, if their places are comparable.
-fn paired(drawn: usize, one: &DrawnFeature, feature: &Feature) -> Result<Matched, String> {
+fn paired(drawn: usize, one: &DrawnFeature, feature: &Feature) -> Result<MatchedFeature, String> {
     let id = feature.id;
     if !is_aligned_by(one.shape.kind) {
         return Err(format!(
@@ -216,7 +216,7 @@ fn paired(drawn: usize, one: &DrawnFeature, feature: &Feature) -> Result<Matched
         place_std,
         axis_std: axis.std,
     };
-    Ok(Matched { drawn, pair, id })
+    Ok(MatchedFeature { drawn, pair, id })
 }
 
 fn datum_of(drawn: &[DrawnFeature], name: &str) -> Result<usize, AlignmentError> {
@@ -235,8 +235,8 @@ fn datum_of(drawn: &[DrawnFeature], name: &str) -> Result<usize, AlignmentError>
 fn of_datums(
     drawn: &[DrawnFeature],
     datums: &[usize],
-    matched: &[Result<Matched, String>],
-) -> Result<Vec<Matched>, AlignmentError> {
+    matched: &[Result<MatchedFeature, String>],
+) -> Result<Vec<MatchedFeature>, AlignmentError> {
     let one = |&at: &usize| {
         let bad = |why: &String| AlignmentError::BadDatum {
             name: drawn[at].name().to_owned(),
@@ -249,7 +249,7 @@ fn of_datums(
 
 fn fitted(
     drawn: &[DrawnFeature],
-    used: &[Matched],
+    used: &[MatchedFeature],
     is_by_datums: bool,
     start: &Isometry3<f64>,
 ) -> Result<DatumFit, AlignmentError> {
@@ -266,7 +266,7 @@ fn fitted(
     })
 }
 
-fn names_of(drawn: &[DrawnFeature], used: &[Matched]) -> String {
+fn names_of(drawn: &[DrawnFeature], used: &[MatchedFeature]) -> String {
     if used.is_empty() {
         return "no touched feature at all".to_owned();
     }
@@ -297,7 +297,7 @@ fn first_names(names: &[String]) -> String {
 fn moved(
     file: &FeatureFile,
     measured: &[Feature],
-    used: &[Matched],
+    used: &[MatchedFeature],
     fit: &DatumFit,
 ) -> FeatureFile {
     let mut file = file.clone();
@@ -315,7 +315,7 @@ fn moved(
 }
 
 /// Standard uncertainty of a centre relative to the drawing frame, m.
-fn place_std(feature: &Feature, used: &[Matched], fit: &DatumFit) -> Option<f64> {
+fn place_std(feature: &Feature, used: &[MatchedFeature], fit: &DatumFit) -> Option<f64> {
     if let Some(at) = used.iter().position(|one| one.id == feature.id) {
         return Some(fit.place_stds[at]);
     }
@@ -346,7 +346,7 @@ fn move_one(record: &mut FeatureRecord, motion: &Isometry3<f64>) {
 
 fn record_of(
     drawn: &[DrawnFeature],
-    used: &[Matched],
+    used: &[MatchedFeature],
     fit: &DatumFit,
     method: &AlignmentMethod,
 ) -> AlignmentRecord {

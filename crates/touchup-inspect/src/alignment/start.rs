@@ -7,7 +7,7 @@ use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use super::error::AlignmentError;
 use crate::drawn_feature::DrawnFeature;
 use touchup_features::align::{DatumFit, DatumPair, FeaturesParams, align_features, fit_datums};
-use touchup_features::features::{Feature, Kind};
+use touchup_features::features::{Feature, FeatureKind};
 
 /// Two motions are equal if their rotations differ by at most this angle, rad.
 const SAME_TURN: f64 = 0.05;
@@ -15,10 +15,15 @@ const SAME_TURN: f64 = 0.05;
 const ALONG: f64 = 0.985;
 
 /// Kinds whose axis serves the alignment.
-pub(super) fn is_aligned_by(kind: Kind) -> bool {
+pub(super) fn is_aligned_by(kind: FeatureKind) -> bool {
     matches!(
         kind,
-        Kind::Hole | Kind::Slot | Kind::Pocket | Kind::Boss | Kind::Cylinder | Kind::Plane
+        FeatureKind::Hole
+            | FeatureKind::Slot
+            | FeatureKind::Pocket
+            | FeatureKind::Boss
+            | FeatureKind::Cylinder
+            | FeatureKind::Plane
     )
 }
 
@@ -90,7 +95,7 @@ fn keeps_axes(pairs: &[DatumPair], fit: &DatumFit) -> bool {
             .nominal_axis
             .map(|axis| (fit.motion * pair.measured_axis).dot(&axis));
         cosine.is_none_or(|cosine| {
-            if pair.kind == Kind::Plane {
+            if pair.kind == FeatureKind::Plane {
                 cosine > ALONG
             } else {
                 cosine.abs() > ALONG

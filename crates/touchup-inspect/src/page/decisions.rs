@@ -4,7 +4,7 @@ use maud::{Markup, html};
 use touchup_document::number::{fixed, signed};
 
 use super::tolerance_bar::tolerance_bar;
-use crate::rows::Inspected;
+use crate::rows::Inspection;
 use touchup_features::features::InspectedQuantity;
 use touchup_io::inspection_file::CharacteristicRecord;
 
@@ -108,7 +108,7 @@ fn row(one: &CharacteristicRecord) -> Markup {
 }
 
 /// The section.
-pub(super) fn table(inspected: &Inspected) -> Markup {
+pub(super) fn table(inspected: &Inspection) -> Markup {
     let record = &inspected.record;
     html! {
         h2 { "Characteristics" }

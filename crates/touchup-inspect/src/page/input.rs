@@ -2,12 +2,12 @@
 
 use crate::calibration::CalibrationLine;
 use crate::params::PartPicture;
-use crate::rows::Inspected;
+use crate::rows::Inspection;
 use crate::source::InspectionSource;
 
 /// Files and decisions.
 pub(crate) struct ReportInput<'a> {
-    pub inspected: &'a Inspected,
+    pub inspected: &'a Inspection,
     pub source: &'a InspectionSource,
     pub calibration: &'a [CalibrationLine],
     pub picture: PartPicture,

@@ -28,7 +28,7 @@ use soup::Soup;
 use touchup_geometry::mesh::{
     Appearance, FARTHEST, MeshError, PointCloud, RepairReport, Texture, TriMesh, is_place, repair,
 };
-pub use unit::{Implausible, LARGEST_M, MeshUnit, SMALLEST_M};
+pub use unit::{ImplausibleSize, LARGEST_M, MeshUnit, SMALLEST_M};
 
 /// Extensions of scan files, in lower case: meshes, then point clouds.
 pub const SCAN_EXTENSIONS: &[&str] = &["ply", "stl", "obj", "pcd", "xyz", "txt", "asc", "e57"];
@@ -93,7 +93,7 @@ pub enum MeshFileError {
         /// the file
         path: PathBuf,
         /// the size, and a plausible unit
-        size: Implausible,
+        size: ImplausibleSize,
     },
 }
 
@@ -275,7 +275,7 @@ pub fn repaired(
         source,
     })?;
     let [low, high] = mesh.bounds();
-    Implausible::check(high - low, unit).map_err(|size| MeshFileError::Implausible {
+    ImplausibleSize::check(high - low, unit).map_err(|size| MeshFileError::Implausible {
         path: path.into(),
         size,
     })?;

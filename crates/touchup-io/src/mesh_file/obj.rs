@@ -22,7 +22,7 @@ use crate::file_error::FilePlace;
 /// normals, texture and materials. Vertices come in order of first use by a face.
 pub(super) fn read(bytes: &[u8], scale: f64) -> Result<Soup, Syntax> {
     let bytes = joined(as_utf8(bytes)?);
-    let mut lines = Lines::new(&bytes, false);
+    let mut lines = ObjLineFilter::new(&bytes, false);
     let no_materials = |_: &Path| Err(LoadError::OpenFileFailed);
     let (models, _) = load(&bytes, &mut lines, no_materials)?;
     let mut soup = Soup::default();
@@ -40,7 +40,7 @@ pub(super) fn read(bytes: &[u8], scale: f64) -> Result<Soup, Syntax> {
 /// with neither colours nor texture coordinates is not parsed.
 pub(super) fn read_painted(bytes: &[u8], scale: f64, folder: &Path) -> Result<PaintedSoup, Syntax> {
     let bytes = joined(as_utf8(bytes)?);
-    let mut lines = Lines::new(&bytes, true);
+    let mut lines = ObjLineFilter::new(&bytes, true);
     lines.has_colours = every_vertex_has_a_colour(&bytes);
     if !lines.has_colours && !has_texture_coordinates(&bytes) {
         return Ok(PaintedSoup::default());
@@ -95,13 +95,13 @@ pub(super) fn read_painted(bytes: &[u8], scale: f64, folder: &Path) -> Result<Pa
     Ok(soup)
 }
 
-type Loaded = (Vec<Model>, Vec<Material>);
+type ObjModels = (Vec<Model>, Vec<Material>);
 
 fn load(
     bytes: &[u8],
-    lines: &mut Lines,
+    lines: &mut ObjLineFilter,
     materials: impl Fn(&Path) -> tobj::MTLLoadResult,
-) -> Result<Loaded, Syntax> {
+) -> Result<ObjModels, Syntax> {
     let options = LoadOptions {
         ignore_points: true,
         ignore_lines: true,
@@ -212,7 +212,7 @@ fn joined(bytes: Cow<'_, [u8]>) -> Cow<'_, [u8]> {
 
 /// Passes on the lines of the mesh, `v` without colours and `f`, or also those of its appearance,
 /// and counts.
-struct Lines<'a> {
+struct ObjLineFilter<'a> {
     rest: &'a [u8],
     /// passes on `vt`, `mtllib` and `usemtl` too
     is_painted: bool,
@@ -226,7 +226,7 @@ struct Lines<'a> {
     vertices: usize,
 }
 
-impl<'a> Lines<'a> {
+impl<'a> ObjLineFilter<'a> {
     fn new(rest: &'a [u8], is_painted: bool) -> Self {
         Self {
             rest,
@@ -249,7 +249,7 @@ impl<'a> Lines<'a> {
     }
 }
 
-impl BufRead for Lines<'_> {
+impl BufRead for ObjLineFilter<'_> {
     fn fill_buf(&mut self) -> io::Result<&[u8]> {
         if self.line.is_empty() && std::mem::take(&mut self.shortened) {
             self.line = b"\n";
@@ -282,7 +282,7 @@ impl BufRead for Lines<'_> {
     }
 }
 
-impl Read for Lines<'_> {
+impl Read for ObjLineFilter<'_> {
     fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
         let amount = self.fill_buf()?.read(out)?;
         self.consume(amount);

@@ -49,7 +49,7 @@ impl MeshUnit {
 
 /// An implausible size of a workpiece, in its stated unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Implausible {
+pub struct ImplausibleSize {
     /// sides of the bounding box, in `unit`
     pub sides: Vector3<f64>,
     /// the unit named by the user
@@ -58,7 +58,7 @@ pub struct Implausible {
     pub suggestion: Option<MeshUnit>,
 }
 
-impl Implausible {
+impl ImplausibleSize {
     /// Refuses a box whose diagonal lies outside [`SMALLEST_M`] to [`LARGEST_M`].
     ///
     /// - `sides_m`: sides of the bounding box, m.
@@ -79,7 +79,7 @@ impl Implausible {
     }
 }
 
-impl fmt::Display for Implausible {
+impl fmt::Display for ImplausibleSize {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self {
             sides,
@@ -125,7 +125,7 @@ mod tests {
         // the block of 5 x 2.5 x 1.375 inch, named in each wrong unit
         let block = Vector3::new(5.0, 2.5, 1.375);
         let refusal = |sides: Vector3<f64>, unit: MeshUnit| {
-            Implausible::check(sides * unit.metres(), unit).map_err(|e| e.to_string())
+            ImplausibleSize::check(sides * unit.metres(), unit).map_err(|e| e.to_string())
         };
         assert_eq!(refusal(block, MeshUnit::Inch), Ok(()));
         assert_eq!(

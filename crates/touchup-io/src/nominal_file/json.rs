@@ -9,15 +9,16 @@ use super::error::NominalFileError;
 use super::record::NominalRecord;
 use crate::file_error::{FileError, read_file, write_file};
 
+/// Nominal values in their JSON form.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct NominalFile {
+struct NominalDocument {
     characteristics: Vec<NominalRecord>,
 }
 
 pub(super) fn read(path: &Path) -> Result<Vec<(String, NominalRecord)>, NominalFileError> {
     let text = read_file(path)?;
-    let file: NominalFile =
+    let file: NominalDocument =
         serde_json::from_slice(&text).map_err(|source| NominalFileError::Json {
             path: path.to_owned(),
             source,
@@ -29,7 +30,7 @@ pub(super) fn read(path: &Path) -> Result<Vec<(String, NominalRecord)>, NominalF
 }
 
 pub(super) fn write(path: &Path, records: &[NominalRecord]) -> Result<(), FileError> {
-    let file = NominalFile {
+    let file = NominalDocument {
         characteristics: records.to_vec(),
     };
     let text =

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use touchup_features::conformity::ToleranceLimits;
-use touchup_features::features::{InspectedQuantity, Kind};
+use touchup_features::features::{FeatureKind, InspectedQuantity};
 
 /// A nominal value and its tolerance; lengths in mm, angles in degrees, in the frame of the mesh.
 /// Unstated values are absent.
@@ -87,8 +87,8 @@ impl NominalRecord {
     }
 
     /// The kind of the feature, after the check.
-    pub fn kind(&self) -> Option<Kind> {
-        Kind::of_name(&self.kind)
+    pub fn kind(&self) -> Option<FeatureKind> {
+        FeatureKind::of_name(&self.kind)
     }
 
     /// Nominal value, mm or degrees; 0 for a zone.
@@ -269,14 +269,14 @@ impl NominalRecord {
 
 impl DatumRecord {
     /// The kind of the feature, after the check.
-    pub fn kind(&self) -> Option<Kind> {
-        Kind::of_name(&self.kind)
+    pub fn kind(&self) -> Option<FeatureKind> {
+        FeatureKind::of_name(&self.kind)
     }
 }
 
 fn check_kind(name: &str, kind: &str) -> Result<(), String> {
-    let kinds = || Kind::ALL.map(Kind::name).join(", ");
-    Kind::of_name(kind)
+    let kinds = || FeatureKind::ALL.map(FeatureKind::name).join(", ");
+    FeatureKind::of_name(kind)
         .map(drop)
         .ok_or_else(|| format!("{name}: there is no kind {kind:?}: take one of {}", kinds()))
 }

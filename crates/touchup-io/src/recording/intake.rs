@@ -5,9 +5,9 @@ use std::path::Path;
 
 use super::error::BadCount;
 use super::messages::cdr::unpack;
-use super::messages::decode::{Decoded, decode};
+use super::messages::decode::{MessageContent, decode};
 use super::messages::transforms::TransformChain;
-use super::messages::wire::Wire;
+use super::messages::wire::WireFormat;
 use super::tables::number_table::TableRow;
 use super::{BadMessage, FilePlace, RawMessage, Record, StampSource, TopicKind};
 use touchup_method::stylus::Message;
@@ -124,7 +124,7 @@ impl Intake {
             record
         };
         match decode_raw(raw)? {
-            Decoded::Record(frame, record) => {
+            MessageContent::Record(frame, record) => {
                 let is_wrench = raw.kind == TopicKind::Wrench;
                 let first = if is_wrench {
                     &mut self.wrench_frame
@@ -134,7 +134,7 @@ impl Intake {
                 in_one_frame(first, &frame)?;
                 Ok(Some(stamped(record)))
             }
-            Decoded::State(state) => {
+            MessageContent::State(state) => {
                 let pose = (raw.kind != TopicKind::Wrench).then_some(state.pose);
                 let wrench = (raw.kind != TopicKind::Pose).then_some(state.wrench);
                 if pose.is_some() {
@@ -148,7 +148,7 @@ impl Intake {
                 self.others.extend(wrench);
                 Ok(Some(stamped(Message::Pose(pose).into())))
             }
-            Decoded::Transforms(links) => {
+            MessageContent::Transforms(links) => {
                 let Some(chain) = &mut self.chain else {
                     return Ok(None);
                 };
@@ -181,9 +181,9 @@ fn in_one_frame(first: &mut Option<String>, frame: &str) -> Result<(), BadMessag
 }
 
 /// Reads a message as stored.
-pub(super) fn decode_raw(raw: &RawMessage) -> Result<Decoded, BadMessage> {
+pub(super) fn decode_raw(raw: &RawMessage) -> Result<MessageContent, BadMessage> {
     match raw.format.wire {
-        Wire::Cdr => decode(raw.format, &unpack(&raw.payload)?, raw.logged_ns),
-        Wire::Ros1 => decode(raw.format, &raw.payload, raw.logged_ns),
+        WireFormat::Cdr => decode(raw.format, &unpack(&raw.payload)?, raw.logged_ns),
+        WireFormat::Ros1 => decode(raw.format, &raw.payload, raw.logged_ns),
     }
 }

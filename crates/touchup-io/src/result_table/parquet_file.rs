@@ -9,17 +9,17 @@ use parquet::file::properties::WriterProperties;
 use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use parquet::schema::types::Type;
 
-use super::{Cell, ResultTable, text_of};
+use super::{ResultCell, ResultTable, text_of};
 
 impl ResultTable {
     /// The bytes of the file.
     pub(super) fn parquet(&self) -> Result<Vec<u8>, ParquetError> {
-        let field = |(name, column): &(String, Vec<Option<Cell>>)| {
+        let field = |(name, column): &(String, Vec<Option<ResultCell>>)| {
             let (physical, logical) = match kind_of(column) {
-                Kind::Number => (Physical::DOUBLE, None),
-                Kind::Count => (Physical::INT64, None),
-                Kind::Flag => (Physical::BOOLEAN, None),
-                Kind::Text => (Physical::BYTE_ARRAY, Some(LogicalType::String)),
+                ColumnKind::Number => (Physical::DOUBLE, None),
+                ColumnKind::Count => (Physical::INT64, None),
+                ColumnKind::Flag => (Physical::BOOLEAN, None),
+                ColumnKind::Text => (Physical::BYTE_ARRAY, Some(LogicalType::String)),
             };
             let field = Type::primitive_type_builder(name, physical).with_logical_type(logical);
             field
@@ -52,7 +52,7 @@ impl ResultTable {
 }
 
 /// The type of a column.
-enum Kind {
+enum ColumnKind {
     Number,
     Count,
     Flag,
@@ -61,42 +61,42 @@ enum Kind {
 
 /// Common type of a column: whole numbers among others are numbers; other mixtures and columns
 /// without a value are text.
-fn kind_of(column: &[Option<Cell>]) -> Kind {
-    let is_all = |is: fn(&Cell) -> bool| column.iter().flatten().all(is);
+fn kind_of(column: &[Option<ResultCell>]) -> ColumnKind {
+    let is_all = |is: fn(&ResultCell) -> bool| column.iter().flatten().all(is);
     if column.iter().all(Option::is_none) {
-        Kind::Text
-    } else if is_all(|cell| matches!(cell, Cell::Count(_))) {
-        Kind::Count
-    } else if is_all(|cell| matches!(cell, Cell::Count(_) | Cell::Number(_))) {
-        Kind::Number
-    } else if is_all(|cell| matches!(cell, Cell::Flag(_))) {
-        Kind::Flag
+        ColumnKind::Text
+    } else if is_all(|cell| matches!(cell, ResultCell::Count(_))) {
+        ColumnKind::Count
+    } else if is_all(|cell| matches!(cell, ResultCell::Count(_) | ResultCell::Number(_))) {
+        ColumnKind::Number
+    } else if is_all(|cell| matches!(cell, ResultCell::Flag(_))) {
+        ColumnKind::Flag
     } else {
-        Kind::Text
+        ColumnKind::Text
     }
 }
 
 fn write_column(
     group: &mut SerializedRowGroupWriter<'_, Vec<u8>>,
-    column: &[Option<Cell>],
+    column: &[Option<ResultCell>],
 ) -> Result<(), ParquetError> {
     match kind_of(column) {
-        Kind::Number => write_values::<DoubleType>(group, column, |cell| match cell {
-            Cell::Number(number) => *number,
-            Cell::Count(count) => *count as f64,
-            Cell::Flag(_) | Cell::Text(_) => f64::NAN,
+        ColumnKind::Number => write_values::<DoubleType>(group, column, |cell| match cell {
+            ResultCell::Number(number) => *number,
+            ResultCell::Count(count) => *count as f64,
+            ResultCell::Flag(_) | ResultCell::Text(_) => f64::NAN,
         }),
-        Kind::Count => write_values::<Int64Type>(group, column, |cell| {
-            if let Cell::Count(count) = cell {
+        ColumnKind::Count => write_values::<Int64Type>(group, column, |cell| {
+            if let ResultCell::Count(count) = cell {
                 *count
             } else {
                 0
             }
         }),
-        Kind::Flag => {
-            write_values::<BoolType>(group, column, |cell| matches!(cell, Cell::Flag(true)))
+        ColumnKind::Flag => {
+            write_values::<BoolType>(group, column, |cell| matches!(cell, ResultCell::Flag(true)))
         }
-        Kind::Text => write_values::<ByteArrayType>(group, column, |cell| {
+        ColumnKind::Text => write_values::<ByteArrayType>(group, column, |cell| {
             ByteArray::from(text_of(Some(cell)).into_bytes())
         }),
     }
@@ -104,8 +104,8 @@ fn write_column(
 
 fn write_values<T: DataType>(
     group: &mut SerializedRowGroupWriter<'_, Vec<u8>>,
-    column: &[Option<Cell>],
-    value: impl Fn(&Cell) -> T::T,
+    column: &[Option<ResultCell>],
+    value: impl Fn(&ResultCell) -> T::T,
 ) -> Result<(), ParquetError> {
     let values: Vec<T::T> = column.iter().flatten().map(value).collect();
     // a present optional value has level 1

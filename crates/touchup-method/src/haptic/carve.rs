@@ -18,7 +18,7 @@ const MOST_OTHERS: usize = 6;
 const SIDEWAYS: f64 = 0.2;
 
 /// A point of a face inside the tip.
-struct Inside {
+struct Penetration {
     /// direction of the shortest path out of the tip, unit
     out: Vector3<f64>,
     /// m
@@ -104,10 +104,10 @@ impl Refiner {
         &mut self,
         carve: &CarveParams,
         face: FaceId,
-        inside: &Inside,
+        inside: &Penetration,
         dt: f64,
     ) -> RegionFit {
-        let Inside {
+        let Penetration {
             out,
             depth,
             barycentric,
@@ -158,7 +158,7 @@ impl Refiner {
     }
 
     /// Deepest tested point of a face, if the tip comes to the face from the front.
-    fn inside(&self, place: &TipPlace, face: FaceId) -> Option<Inside> {
+    fn inside(&self, place: &TipPlace, face: FaceId) -> Option<Penetration> {
         if self.deformable.is_stiff(face) {
             return None;
         }
@@ -169,7 +169,7 @@ impl Refiner {
             Point3::from(corners[0].coords * u + corners[1].coords * v + corners[2].coords * w);
         let (distance, out) = body.shortest_exit(place, &point);
         let is_front = normal.dot(&out) < -SIDEWAYS;
-        (is_front && distance < 0.0).then_some(Inside {
+        (is_front && distance < 0.0).then_some(Penetration {
             out,
             depth: -distance,
             barycentric: [u, v, w],
@@ -177,7 +177,7 @@ impl Refiner {
     }
 
     /// Direction in which the mesh yields to the ball, and depth of the ball in it.
-    fn penetration(&self, centre: &Point3<f64>, hit: &FaceHit) -> Option<Inside> {
+    fn penetration(&self, centre: &Point3<f64>, hit: &FaceHit) -> Option<Penetration> {
         let normal = self.deformable.mesh.normal(hit.face);
         let arm = centre - hit.point;
         let (distance, along) = length_and_direction(&arm);
@@ -192,7 +192,7 @@ impl Refiner {
             along * height.signum()
         };
         let depth = self.params.tip.radius - distance.copysign(height);
-        Some(Inside {
+        Some(Penetration {
             out: -away,
             depth,
             barycentric: hit.barycentric,

@@ -9,7 +9,8 @@ use super::roi::{Roi, RoiSize};
 use super::stroke_undo::StrokeUndo;
 use crate::reconstruct::{PatchDelta, Support};
 use touchup_geometry::mesh::{
-    FaceHit, FaceId, FaceTree, MeshError, Nearby, RefitPlan, Region, TriMesh, VertexId, is_place,
+    FaceHit, FaceId, FaceTree, MeshError, NearbyLeaves, RefitPlan, Region, TriMesh, VertexId,
+    is_place,
 };
 
 /// Factor on the length of an update that would break the mesh, for the next try.
@@ -126,7 +127,7 @@ impl DeformableMesh {
         p: &Point3<f64>,
         hint: Option<FaceId>,
         reach: f64,
-        nearby: &mut Nearby,
+        nearby: &mut NearbyLeaves,
     ) -> Option<FaceHit> {
         match hint {
             Some(hint) => self.tree.closest_nearby(&self.mesh, p, hint, reach, nearby),

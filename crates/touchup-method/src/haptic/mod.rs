@@ -23,8 +23,8 @@ use serde::Serialize;
 
 pub use deform::{Footprint, RegionFit};
 pub use dynamics::{
-    Along, ContactModel, DynamicsError, DynamicsParams, FaceDynamics, FaceState, SigmoidParams,
-    StepRule,
+    ContactModel, DynamicsError, DynamicsParams, FaceDynamics, FaceState, MotionDirection,
+    SigmoidParams, StepRule,
 };
 pub use guard::GuardParams;
 pub use params::{CarveParams, RefineParams, ScanParams, ScanRegion, TouchPoint, relaxing_alpha};
@@ -42,7 +42,7 @@ use crate::stylus::{
 use deform::{DeformableMesh, HandleRegion};
 use dynamics::turn;
 use touchup_geometry::mesh::{
-    BoxQuery, Changes, FaceHit, FaceId, MeshError, Nearby, TriMesh, VertexId,
+    BoxQuery, Changes, FaceHit, FaceId, MeshError, NearbyLeaves, TriMesh, VertexId,
 };
 
 /// Uncertainty of the measured normal of one sample, rad: a flat tip that may lie on its face does.
@@ -185,9 +185,9 @@ pub struct Refiner {
     /// track of the touching point; `None` without contact, and if the point depends on the face
     track: Option<TouchTrack>,
     /// leaves around the touching point of the tip
-    near_contact: Nearby,
+    near_contact: NearbyLeaves,
     /// leaves around the middle of the tip
-    near_tip: Nearby,
+    near_tip: NearbyLeaves,
     body: TipBody,
     /// from the tip to the handle, unit, in O; unused for a ball
     axis: Vector3<f64>,
@@ -242,8 +242,8 @@ impl Refiner {
             carve_region: deformable.region(RoiSize::Handle),
             nearest: None,
             track: None,
-            near_contact: Nearby::default(),
-            near_tip: Nearby::default(),
+            near_contact: NearbyLeaves::default(),
+            near_tip: NearbyLeaves::default(),
             deformable,
             body: TipBody::new(params.shape, params.tip.radius)?,
             axis: Vector3::z(),
@@ -547,7 +547,7 @@ impl Refiner {
 
     /// Rigid motion of the handle to its next state, as steps of its corners, m.
     ///
-    /// With [`Along::Force`] a corner moves along `normal` only: the sideways part of the turn
+    /// With [`MotionDirection::Force`] a corner moves along `normal` only: the sideways part of the turn
     /// would make the triangles creep.
     fn rigid_steps(
         &self,
@@ -563,7 +563,7 @@ impl Refiner {
         let axis = face.n.cross(&next.n);
         let bend = 1.0 / (1.0 + face.n.dot(&next.n)).max(f64::EPSILON);
         let longest = self.params.longest_step_edges * self.deformable.mean_edge;
-        let along = self.params.dynamics.along == Along::Force;
+        let along = self.params.dynamics.along == MotionDirection::Force;
         let steps = self.deformable.mesh.triangle(*handle).map(|corner| {
             let arm = corner - face.b;
             let across = axis.cross(&arm);

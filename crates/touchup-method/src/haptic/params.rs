@@ -1,7 +1,7 @@
 //! Settings of a [`super::Refiner`], and two presets.
 
 use super::guard::GuardParams;
-use super::{Along, ContactModel, DynamicsParams, RoiSize, StepRule};
+use super::{ContactModel, DynamicsParams, MotionDirection, RoiSize, StepRule};
 use crate::parameters;
 use crate::stylus::{
     BiasParams, CompensatorParams, ContactEstimatorParams, ContactGateParams, SettingError,
@@ -172,7 +172,7 @@ impl RefineParams {
                 alpha_m_per_n_s: relaxing_alpha(&model),
                 beta_per_n2_s: 0.0,
                 rule: StepRule::Lie,
-                along: Along::Force,
+                along: MotionDirection::Force,
                 take_out_rigid_offset: tip.stiffness.is_none(),
             },
             turning: Some(TURNING),
@@ -197,7 +197,7 @@ impl RefineParams {
             sliding: None,
             touch_point: TouchPoint::FaceNormal,
             dynamics: DynamicsParams {
-                along: Along::InitialNormal,
+                along: MotionDirection::InitialNormal,
                 rule: StepRule::Bounded,
                 take_out_rigid_offset: false,
                 ..DynamicsParams::default()

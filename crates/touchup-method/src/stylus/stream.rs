@@ -28,7 +28,7 @@ pub(super) struct Stream<T> {
     pub counts: SyncCounts,
 }
 
-impl<T: Stamped + Copy> Stream<T> {
+impl<T: StampedMessage + Copy> Stream<T> {
     pub fn new(capacity: usize, wait_ns: i64) -> Self {
         Self {
             held: VecDeque::with_capacity(capacity),
@@ -156,7 +156,7 @@ impl<T: Stamped + Copy> Stream<T> {
     }
 }
 
-pub(super) trait Stamped {
+pub(super) trait StampedMessage {
     /// Whether dropping one is a loss in itself; a dropped pose counts only through a wrench that
     /// needs it.
     const IS_LOST_ALONE: bool;
@@ -164,7 +164,7 @@ pub(super) trait Stamped {
     fn stamp_ns(&self) -> i64;
 }
 
-impl Stamped for StampedPose {
+impl StampedMessage for StampedPose {
     const IS_LOST_ALONE: bool = false;
 
     fn stamp_ns(&self) -> i64 {
@@ -172,7 +172,7 @@ impl Stamped for StampedPose {
     }
 }
 
-impl Stamped for StampedWrench {
+impl StampedMessage for StampedWrench {
     const IS_LOST_ALONE: bool = true;
 
     fn stamp_ns(&self) -> i64 {

@@ -18,7 +18,7 @@ const FEWEST_OF_A_CAUSE: u64 = 50;
 
 /// Counts since the start of the session.
 #[derive(Clone, Debug)]
-struct Counted {
+struct AcceptanceCounts {
     at: Instant,
     accepted: u64,
     refused: BTreeMap<String, u64>,
@@ -27,12 +27,12 @@ struct Counted {
 /// Recent fate of poses and wrenches.
 #[derive(Clone, Debug, Default)]
 pub struct Acceptance {
-    counted: VecDeque<Counted>,
+    counted: VecDeque<AcceptanceCounts>,
 }
 
 /// Verdict on the samples.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Verdict {
+pub enum SampleVerdict {
     /// Both streams come, for too short a time for a verdict.
     Begins,
     /// Samples are accepted, and at most half of the input is refused.
@@ -64,7 +64,7 @@ impl Acceptance {
         now: Instant,
         accepted: u64,
         refused: BTreeMap<String, u64>,
-    ) -> Verdict {
+    ) -> SampleVerdict {
         let since = |at: Instant| now.saturating_duration_since(at);
         if self
             .counted
@@ -82,7 +82,7 @@ impl Acceptance {
             self.counted.pop_front();
         }
         let verdict = match self.counted.front() {
-            None => Verdict::Begins,
+            None => SampleVerdict::Begins,
             Some(first) => first.verdict(since(first.at), accepted, &refused),
         };
         if self
@@ -90,7 +90,7 @@ impl Acceptance {
             .back()
             .is_none_or(|last| since(last.at) >= KEPT_EVERY)
         {
-            self.counted.push_back(Counted {
+            self.counted.push_back(AcceptanceCounts {
                 at: now,
                 accepted,
                 refused,
@@ -100,8 +100,13 @@ impl Acceptance {
     }
 }
 
-impl Counted {
-    fn verdict(&self, over: Duration, accepted: u64, refused: &BTreeMap<String, u64>) -> Verdict {
+impl AcceptanceCounts {
+    fn verdict(
+        &self,
+        over: Duration,
+        accepted: u64,
+        refused: &BTreeMap<String, u64>,
+    ) -> SampleVerdict {
         let accepted = accepted - self.accepted;
         let lately = |(reason, count): (&String, &u64)| {
             (
@@ -129,18 +134,18 @@ impl Counted {
         match main {
             _ if over < SETTLES => {
                 if accepted > 0 {
-                    Verdict::Accepts
+                    SampleVerdict::Accepts
                 } else {
-                    Verdict::Begins
+                    SampleVerdict::Begins
                 }
             }
-            Some((reason, count)) if total > accepted => Verdict::Refuses {
+            Some((reason, count)) if total > accepted => SampleVerdict::Refuses {
                 reason,
                 count,
                 of: total + accepted,
             },
-            _ if accepted == 0 => Verdict::PairsNone,
-            _ => Verdict::Accepts,
+            _ if accepted == 0 => SampleVerdict::PairsNone,
+            _ => SampleVerdict::Accepts,
         }
     }
 }
@@ -189,9 +194,9 @@ mod tests {
 
     /// Judges every 5 ms for a duration, ms; in each ms `each` adds to accepted and to the refused,
     /// by reason.
-    fn after(ms: u32, each: impl Fn(u32, &mut u64, &mut BTreeMap<String, u64>)) -> Verdict {
+    fn after(ms: u32, each: impl Fn(u32, &mut u64, &mut BTreeMap<String, u64>)) -> SampleVerdict {
         let (begun, mut acceptance) = (Instant::now(), Acceptance::default());
-        let (mut accepted, mut refused, mut verdict) = (0, BTreeMap::new(), Verdict::Begins);
+        let (mut accepted, mut refused, mut verdict) = (0, BTreeMap::new(), SampleVerdict::Begins);
         for at in 0..=ms {
             each(at, &mut accepted, &mut refused);
             if at % 5 == 0 {
@@ -212,7 +217,7 @@ mod tests {
             4..8 => refuse(refused, "gap"),
             _ => refuse(refused, "late"),
         });
-        let Verdict::Refuses { reason, count, of } = verdict else {
+        let SampleVerdict::Refuses { reason, count, of } = verdict else {
             panic!("{verdict:?}")
         };
         // the window is 2 s and up to 250 ms more
@@ -225,7 +230,7 @@ mod tests {
                 refuse(refused, "gap")
             }
         });
-        assert_eq!(fewer, Verdict::Accepts);
+        assert_eq!(fewer, SampleVerdict::Accepts);
     }
 
     #[test]
@@ -237,8 +242,8 @@ mod tests {
                 *accepted += 1
             }
         };
-        assert!(matches!(after(1500, mended), Verdict::Refuses { .. }));
-        assert_eq!(after(3500, mended), Verdict::Accepts);
+        assert!(matches!(after(1500, mended), SampleVerdict::Refuses { .. }));
+        assert_eq!(after(3500, mended), SampleVerdict::Accepts);
         let broken = |at, accepted: &mut u64, refused: &mut _| {
             if at < 9000 {
                 *accepted += 1
@@ -246,25 +251,28 @@ mod tests {
                 refuse(refused, "gap")
             }
         };
-        assert!(matches!(after(11_000, broken), Verdict::Refuses { .. }));
+        assert!(matches!(
+            after(11_000, broken),
+            SampleVerdict::Refuses { .. }
+        ));
         let none = |at, accepted: &mut u64, _: &mut _| *accepted += u64::from(at < 9000);
-        assert_eq!(after(12_000, none), Verdict::PairsNone);
+        assert_eq!(after(12_000, none), SampleVerdict::PairsNone);
     }
 
     #[test]
     fn a_begin_is_no_fault_and_refusals_of_other_messages_mean_nothing() {
         assert_eq!(
             after(900, |_, _, refused| refuse(refused, "no_pose_before")),
-            Verdict::Begins
+            SampleVerdict::Begins
         );
         assert!(matches!(
             after(1000, |_, _, refused| refuse(refused, "no_pose_before")),
-            Verdict::Refuses { .. }
+            SampleVerdict::Refuses { .. }
         ));
         let others = |at, accepted: &mut u64, refused: &mut _| {
             *accepted += u64::from(at % 10 == 0);
             refuse(refused, "bad_transform");
         };
-        assert_eq!(after(4000, others), Verdict::Accepts);
+        assert_eq!(after(4000, others), SampleVerdict::Accepts);
     }
 }

@@ -23,11 +23,11 @@ use crate::ros::messages::{
 use crate::ros::parameters::ParameterValue;
 use crate::ros::port::{Call, Endpoint, Reply};
 use crate::ros::stop::NO_ARM;
-use touchup_features::features::Kind;
+use touchup_features::features::FeatureKind;
 use touchup_io::session_folder::SessionFolder;
 use touchup_probing::execute::Flag;
 use touchup_session::live::EngineResult;
-use touchup_session::session::{Exchange, StrokeChange};
+use touchup_session::session::{StrokeChange, UndoStep};
 
 /// Maximum radius of a flag, m.
 const LARGEST_RADIUS: f64 = 1.0;
@@ -161,7 +161,7 @@ impl RefinementWorker {
     /// Flags a point from RViz's Publish Point.
     pub(super) fn flag_clicked(&mut self, clicked: &PointStamped) {
         let parameters = self.setup.shared.parameters();
-        let kind = Kind::of_name(parameters.string("flag_kind"));
+        let kind = FeatureKind::of_name(parameters.string("flag_kind"));
         match self.point_in_object(clicked) {
             Ok(place) => {
                 self.ask_features(FeatureInput::Flag(
@@ -221,7 +221,7 @@ impl RefinementWorker {
                 }
             }
             let after_ns = self.session.last_ns.unwrap_or(i64::MIN);
-            let exchange = Exchange {
+            let exchange = UndoStep {
                 after_ns,
                 stroke_ns: self.session.engine.changed_stroke_ns(),
             };

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use tracing::{info, warn};
 
-use super::acceptance::{Verdict, is_of_pairing, meaning};
+use super::acceptance::{SampleVerdict, is_of_pairing, meaning};
 use super::channels::ViewInput;
 use super::error::NodeError;
 use super::refinement::RefinementWorker;
@@ -14,7 +14,7 @@ use crate::ros::convert::header;
 use crate::ros::messages::{DiagnosticArray, DiagnosticStatus, KeyValue};
 use crate::ros::port::Endpoint;
 use touchup_session::live::{Latencies, Quantiles};
-use touchup_session::session::Unrecorded;
+use touchup_session::session::RecordingLoss;
 
 /// State before the first verdict on the samples.
 const BEGINS: &str = "begins";
@@ -61,7 +61,7 @@ impl RefinementWorker {
         if let Some(fault) = &self.fault {
             return (DiagnosticStatus::ERROR, format!("stopped: {fault}"));
         }
-        if let Unrecorded {
+        if let RecordingLoss {
             reason: Some(reason),
             is_refused: true,
             ..
@@ -180,11 +180,11 @@ impl RefinementWorker {
             return (DiagnosticStatus::WARN, words);
         }
         match verdict {
-            Verdict::Begins => (
+            SampleVerdict::Begins => (
                 DiagnosticStatus::STALE,
                 format!("{BEGINS}: poses and wrenches come, no sample yet"),
             ),
-            Verdict::Refuses { reason, count, of } => {
+            SampleVerdict::Refuses { reason, count, of } => {
                 let is_repeated = reason.ends_with("duplicate");
                 let why = match reason.as_str() {
                     of if (is_repeated || is_of_pairing(of)) && poses.is_unstamped() => {
@@ -200,7 +200,7 @@ impl RefinementWorker {
                     format!("refuses most of what comes ({reason}): {why}; {count} of {of} lately");
                 (DiagnosticStatus::WARN, words)
             }
-            Verdict::PairsNone => {
+            SampleVerdict::PairsNone => {
                 let why = match beyond.abs() > NAMED_APART {
                     true => apart,
                     false => "no wrench is stamped between two poses".to_owned(),
@@ -210,11 +210,11 @@ impl RefinementWorker {
                     format!("makes no samples though poses and wrenches come: {why}"),
                 )
             }
-            Verdict::Accepts if beyond.abs() > CLOCKS_APART => (
+            SampleVerdict::Accepts if beyond.abs() > CLOCKS_APART => (
                 DiagnosticStatus::WARN,
                 format!("pairs what was not measured together: {apart}"),
             ),
-            Verdict::Accepts if let Some(finding) = self.doubts.first() => {
+            SampleVerdict::Accepts if let Some(finding) = self.doubts.first() => {
                 let level = if finding.is_sure {
                     DiagnosticStatus::ERROR
                 } else {
@@ -225,7 +225,7 @@ impl RefinementWorker {
                     format!("doubts its input ({}): {finding}", finding.cause),
                 )
             }
-            Verdict::Accepts => (DiagnosticStatus::OK, "runs: samples are taken".to_owned()),
+            SampleVerdict::Accepts => (DiagnosticStatus::OK, "runs: samples are taken".to_owned()),
         }
     }
 

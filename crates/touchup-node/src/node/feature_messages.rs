@@ -10,7 +10,7 @@ use crate::ros::messages::{
 use crate::ros::parameters::KIND_NAMES;
 use crate::ros::refusal::{NO_VECTOR, unknown_feature};
 use touchup_features::features::{
-    Feature, FittedTo, Form, InspectedQuantity, Kind, Relation, RelationKind,
+    Feature, FeatureKind, FittedTo, Form, InspectedQuantity, Relation, RelationKind,
 };
 use touchup_probing::execute::Flag;
 
@@ -24,7 +24,7 @@ const LINE: f64 = 0.6e-3;
 const CLEAR: f64 = 0.1e-3;
 
 /// Message number of a kind; `None` is a region of unknown kind.
-pub fn number_of(kind: Option<Kind>) -> u8 {
+pub fn number_of(kind: Option<FeatureKind>) -> u8 {
     kind.map_or(FeatureMsg::KIND_UNKNOWN, |kind| {
         FeatureMsg::KIND_HOLE + kind as u8
     })
@@ -34,8 +34,8 @@ pub fn number_of(kind: Option<Kind>) -> u8 {
 ///
 /// # Errors
 /// In words, if no kind has this number.
-pub fn kind_of(number: u8) -> Result<Option<Kind>, String> {
-    let mut kinds = std::iter::once(None).chain(Kind::ALL.into_iter().map(Some));
+pub fn kind_of(number: u8) -> Result<Option<FeatureKind>, String> {
+    let mut kinds = std::iter::once(None).chain(FeatureKind::ALL.into_iter().map(Some));
     let most = KIND_NAMES.len() - 1;
     kinds
         .find(|kind| number_of(*kind) == number)
@@ -441,17 +441,17 @@ mod tests {
     #[test]
     fn kinds_have_the_numbers_of_the_message() {
         let numbers = [
-            (Kind::Hole, FeatureMsg::KIND_HOLE),
-            (Kind::Slot, FeatureMsg::KIND_SLOT),
-            (Kind::Pocket, FeatureMsg::KIND_POCKET),
-            (Kind::Boss, FeatureMsg::KIND_BOSS),
-            (Kind::Edge, FeatureMsg::KIND_EDGE),
-            (Kind::Corner, FeatureMsg::KIND_CORNER),
-            (Kind::Plane, FeatureMsg::KIND_PLANE),
-            (Kind::Cylinder, FeatureMsg::KIND_CYLINDER),
-            (Kind::Notch, FeatureMsg::KIND_NOTCH),
+            (FeatureKind::Hole, FeatureMsg::KIND_HOLE),
+            (FeatureKind::Slot, FeatureMsg::KIND_SLOT),
+            (FeatureKind::Pocket, FeatureMsg::KIND_POCKET),
+            (FeatureKind::Boss, FeatureMsg::KIND_BOSS),
+            (FeatureKind::Edge, FeatureMsg::KIND_EDGE),
+            (FeatureKind::Corner, FeatureMsg::KIND_CORNER),
+            (FeatureKind::Plane, FeatureMsg::KIND_PLANE),
+            (FeatureKind::Cylinder, FeatureMsg::KIND_CYLINDER),
+            (FeatureKind::Notch, FeatureMsg::KIND_NOTCH),
         ];
-        assert_eq!(numbers.map(|(kind, _)| kind), Kind::ALL);
+        assert_eq!(numbers.map(|(kind, _)| kind), FeatureKind::ALL);
         for (kind, number) in numbers {
             assert_eq!(number_of(Some(kind)), number);
             assert_eq!(kind_of(number), Ok(Some(kind)));
@@ -474,14 +474,14 @@ mod tests {
                 radius: 5e-3,
             })
         };
-        let mut hole = place(3, Kind::Hole);
+        let mut hole = place(3, FeatureKind::Hole);
         assert_eq!(label(&hole), "hole?");
         hole.status = FeatureMsg::STATUS_FOUND;
         (hole.diameter, hole.diameter_std) = (8.02e-3, 0.02e-3);
         assert_eq!(label(&hole), "hole Ø8.02 ± 0.04");
         hole.diameter_std = f64::NAN;
         assert_eq!(label(&hole), "hole Ø8.02");
-        let mut slot = place(4, Kind::Slot);
+        let mut slot = place(4, FeatureKind::Slot);
         slot.status = FeatureMsg::STATUS_FOUND;
         (slot.width, slot.length, slot.length_std) = (6e-3, 20e-3, 0.1e-3);
         assert_eq!(label(&slot), "slot 6.00 × 20.00 ± 0.20");

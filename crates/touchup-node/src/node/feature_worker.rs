@@ -9,14 +9,14 @@ use nalgebra::Vector3;
 
 use super::channels::{ArmMeasurement, FeatureInput, NextTouches, ViewInput};
 use super::feature_messages::{flagged, found, related};
-use super::shared::Shared;
+use super::shared::SharedNodeState;
 use crate::ros::convert::header;
 use crate::ros::messages::{
     DetectFeaturesRequest, DetectFeaturesResponse, Feature as FeatureMsg, FeatureArray,
     FlagFeatureResponse, UnflagFeatureResponse,
 };
 use crate::ros::parameters::KIND_NAMES;
-use touchup_features::features::{Feature, Kind, Tracker, relations};
+use touchup_features::features::{Feature, FeatureKind, Tracker, relations};
 use touchup_geometry::mesh::MeshError;
 use touchup_method::stylus::ProbedPoint;
 use touchup_probing::execute::Flag;
@@ -37,7 +37,7 @@ const SNAPSHOT_WAIT: Duration = Duration::from_secs(10);
 /// State of the feature thread.
 pub struct FeatureWorker {
     clock: Clock,
-    shared: Arc<Shared>,
+    shared: Arc<SharedNodeState>,
     view: SyncSender<ViewInput>,
     session: String,
     tracker: Tracker,
@@ -64,7 +64,7 @@ impl FeatureWorker {
     /// Before the first input.
     pub fn new(
         clock: Clock,
-        shared: Arc<Shared>,
+        shared: Arc<SharedNodeState>,
         view: SyncSender<ViewInput>,
         session: String,
     ) -> Self {
@@ -246,7 +246,7 @@ impl FeatureWorker {
     }
 
     fn flag(&mut self, flag: Flag) -> FlagFeatureResponse {
-        let kind = flag.kind.map_or("unknown", Kind::name);
+        let kind = flag.kind.map_or("unknown", FeatureKind::name);
         if self.flags.len() >= MOST_FLAGS {
             let message = format!("{MOST_FLAGS} places are flagged already: take some back");
             return FlagFeatureResponse {

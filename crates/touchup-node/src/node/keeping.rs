@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use touchup_io::recording::Topics;
 use touchup_session::session::{
-    SessionRecorder, StrokeChange, StrokeChanges, StrokeHistory, Unrecorded,
+    RecordingLoss, SessionRecorder, StrokeChange, StrokeChanges, StrokeHistory,
 };
 
 /// Whether a session is recorded or replayed.
@@ -31,7 +31,7 @@ impl Keeping {
     }
 
     /// Messages missing in its recording up to now.
-    pub fn unrecorded(&self) -> Unrecorded {
+    pub fn unrecorded(&self) -> RecordingLoss {
         self.recorder()
             .map(SessionRecorder::unrecorded)
             .unwrap_or_default()
@@ -111,11 +111,11 @@ impl ReplayedSession {
 mod tests {
     use super::*;
     use touchup_method::reconstruct::StrokeSpan;
-    use touchup_session::session::{Exchange, Removal};
+    use touchup_session::session::{Removal, UndoStep};
 
     #[test]
     fn strokes_change_after_the_sample_that_the_record_names_and_again_in_the_next_run() {
-        let exchange = |after_ns, stroke_ns| Exchange {
+        let exchange = |after_ns, stroke_ns| UndoStep {
             after_ns,
             stroke_ns: Some(stroke_ns),
         };

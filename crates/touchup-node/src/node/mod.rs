@@ -40,6 +40,6 @@ mod view;
 pub use arm::{ArmKind, ArmOfNode};
 pub use error::NodeError;
 pub use keeping::ReplayedSession;
-pub use running::{INBOX, Node, Prepared};
+pub use running::{INBOX, Node, PreparedNode};
 pub use session::{NodeEnd, SessionReport};
 pub use setup::mesh_unit;

@@ -15,7 +15,7 @@ use super::variances::Variances;
 use crate::ros::locked;
 use touchup_geometry::mesh::{Changes, FaceId, MeshError, TriMesh, VertexId};
 use touchup_method::reconstruct::Support;
-use touchup_session::clock::{Clock, Working};
+use touchup_session::clock::{Clock, WorkGuard};
 use touchup_session::live::{Engine, LiveError};
 
 /// Maximum number of vertices, and of faces, per transfer: some 50 µs.
@@ -432,7 +432,7 @@ impl MeshReplica {
 #[derive(Debug)]
 pub struct Snapshot {
     mesh: Arc<MeshVersion>,
-    _working: Working,
+    _working: WorkGuard,
 }
 
 impl Deref for Snapshot {

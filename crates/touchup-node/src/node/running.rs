@@ -15,7 +15,7 @@ use super::replica::Edits;
 use super::session::{NodeEnd, NodeSession};
 use super::setup::Setup;
 use super::side_work::{begin, begin_behind};
-use super::view::View;
+use super::view::ViewWorker;
 use crate::ros::inbox::Arrivals;
 use crate::ros::messages::MeshPatch;
 use crate::ros::parameters::{ParameterValue, Parameters};
@@ -46,12 +46,12 @@ pub struct Node {
 
 /// A node that has read scene and scan and begun a session, and does not listen yet: loading a
 /// large scan takes seconds, in which no message may be lost.
-pub struct Prepared {
+pub struct PreparedNode {
     setup: Arc<Setup>,
     session: NodeSession,
 }
 
-impl Prepared {
+impl PreparedNode {
     /// Reads scene and scan and begins a session.
     ///
     /// # Errors
@@ -189,7 +189,7 @@ impl Prepared {
         let _ = stops.allow(&ParameterValue::Bool(
             setup.shared.parameters().bool(ALLOW_MOTION),
         ));
-        let view = View::new(
+        let view = ViewWorker::new(
             clock.clone(),
             Arc::clone(&port),
             Arc::clone(&setup.shared),

@@ -21,8 +21,8 @@ use touchup_session::live::{
     Engine, EngineResult, Gate, Latencies, Pace, Quantiles, Renewal, TouchDelta,
 };
 use touchup_session::session::{
-    Outcome, OutcomeError, OutcomePlaces, RefinedMesh, SessionRecord, SessionRecorder,
-    StrokeChanges, Unrecorded,
+    Outcome, OutcomeError, OutcomePlaces, RecordingLoss, RefinedMesh, SessionRecord,
+    SessionRecorder, StrokeChanges,
 };
 
 /// Numbers of accepted, refused and skipped input.
@@ -258,7 +258,7 @@ impl NodeSession {
         let Keeping::Recorded(recorder) = keeping else {
             return Ok(report);
         };
-        let Unrecorded {
+        let RecordingLoss {
             messages, reason, ..
         } = recorder.finish();
         report.unrecorded = messages;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::error::NodeError;
 use super::replica::MeshReplica;
-use super::shared::Shared;
+use super::shared::SharedNodeState;
 use crate::ros::parameters::Parameters;
 use touchup_geometry::mesh::{FaceTree, TriMesh};
 use touchup_io::mesh_file::MeshUnit;
@@ -15,13 +15,13 @@ use touchup_session::scan::read_scan;
 use touchup_session::scene::{CutScan, RegionCut, Scene, SceneError, Setting};
 
 /// The original scan, and the tree over its faces.
-pub type Scan = Arc<(TriMesh, FaceTree)>;
+pub type IndexedScan = Arc<(TriMesh, FaceTree)>;
 
 /// Constant data of a running node.
 pub(crate) struct Setup {
     pub clock: Clock,
-    pub shared: Arc<Shared>,
-    pub scan: Scan,
+    pub shared: Arc<SharedNodeState>,
+    pub scan: IndexedScan,
     pub scan_path: PathBuf,
     pub mesh_unit: MeshUnit,
     pub scene: Scene,
@@ -69,7 +69,7 @@ impl Setup {
         let replica = MeshReplica::new(clock.clone(), &mesh);
         Ok(Self {
             clock,
-            shared: Arc::new(Shared::new(parameters, scan_sigma, replica)),
+            shared: Arc::new(SharedNodeState::new(parameters, scan_sigma, replica)),
             scan: Arc::new((mesh, tree)),
             scan_path,
             mesh_unit,

@@ -9,9 +9,9 @@ use super::replica::MeshReplica;
 use crate::ros::locked;
 use crate::ros::parameters::Parameters;
 
-/// Readable from all threads.
+/// State of the node, readable from all threads.
 #[derive(Debug)]
-pub struct Shared {
+pub struct SharedNodeState {
     /// frame of all publications
     pub frame: String,
     /// standard deviation of the scan, m, if in the scene
@@ -29,7 +29,7 @@ pub struct Shared {
     pub has_new_viewer: AtomicBool,
 }
 
-impl Shared {
+impl SharedNodeState {
     /// Before the first publication.
     pub fn new(parameters: Parameters, scan_sigma: Option<f64>, mesh: MeshReplica) -> Self {
         Self {

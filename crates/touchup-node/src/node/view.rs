@@ -10,7 +10,7 @@ use super::channels::{LastTip, NextTouches, ViewInput};
 use super::feature_messages;
 use super::mesh_patches::MeshPatches;
 use super::replica::Edits;
-use super::shared::Shared;
+use super::shared::SharedNodeState;
 use super::tiles::{ColourBy, Tiles};
 use super::tip;
 use crate::ros::messages::{FeatureArray, MeshPatch};
@@ -26,10 +26,10 @@ const PARTS_AT_ONCE: usize = 64;
 const CATCH_UP: Duration = Duration::from_millis(10);
 
 /// State of the view thread.
-pub struct View {
+pub struct ViewWorker {
     clock: Clock,
     port: Arc<dyn Port>,
-    shared: Arc<Shared>,
+    shared: Arc<SharedNodeState>,
     /// returns change lists for filling
     spare: SyncSender<Box<Edits>>,
     tiles: Tiles,
@@ -42,12 +42,12 @@ pub struct View {
     next: NextTouches,
 }
 
-impl View {
+impl ViewWorker {
     /// Before the first publication.
     pub fn new(
         clock: Clock,
         port: Arc<dyn Port>,
-        shared: Arc<Shared>,
+        shared: Arc<SharedNodeState>,
         spare: SyncSender<Box<Edits>>,
     ) -> Self {
         let (replica, _) = shared.mesh.now();
@@ -213,7 +213,7 @@ impl View {
 }
 
 /// Colouring by the parameter of this name.
-pub(super) fn colour_by(shared: &Shared) -> ColourBy {
+pub(super) fn colour_by(shared: &SharedNodeState) -> ColourBy {
     match shared.parameters().string("colour_by") {
         "mismatch" => ColourBy::Mismatch,
         _ => ColourBy::Touched,

@@ -50,7 +50,7 @@ impl Secret {
 }
 
 /// Secrets and their roles, the oldest first.
-type Known = VecDeque<(Secret, Role)>;
+type SecretRoles = VecDeque<(Secret, Role)>;
 
 /// Authorisation of pages.
 #[derive(Debug)]
@@ -65,8 +65,8 @@ pub(super) struct Access {
     /// without links everybody who reaches the address operates
     needs_cookie: bool,
     cookie_name: String,
-    links: Mutex<Known>,
-    cookies: Mutex<Known>,
+    links: Mutex<SecretRoles>,
+    cookies: Mutex<SecretRoles>,
 }
 
 impl Access {
@@ -214,7 +214,7 @@ impl Access {
     }
 }
 
-fn remember(known: &Mutex<Known>, secret: &Secret, role: Role) {
+fn remember(known: &Mutex<SecretRoles>, secret: &Secret, role: Role) {
     let mut known = locked(known);
     if known.len() == MOST_KNOWN {
         known.pop_front();

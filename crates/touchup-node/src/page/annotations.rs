@@ -22,7 +22,7 @@ const MOST_ANNOTATED: usize = 10_000;
 /// Verdict of an operator on a feature.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub(super) enum Mark {
+pub(super) enum OperatorVerdict {
     #[default]
     None,
     Accepted,
@@ -34,7 +34,7 @@ pub(super) enum Mark {
 #[serde(default)]
 pub(super) struct Annotation {
     pub name: String,
-    pub mark: Mark,
+    pub mark: OperatorVerdict,
     /// the feature at the time of its lock: the values that count from then on
     pub locked: Option<Value>,
 }
@@ -45,7 +45,7 @@ pub(super) struct Annotation {
 pub(super) struct AnnotateRequest {
     pub id: u32,
     pub name: Option<String>,
-    pub mark: Option<Mark>,
+    pub mark: Option<OperatorVerdict>,
     pub is_locked: Option<bool>,
 }
 
@@ -187,7 +187,10 @@ mod tests {
             .unwrap();
         let again = Annotations::new(folder.path()).of("one").features;
         let Annotation { name, mark, locked } = &again[&7];
-        assert_eq!((name.as_str(), *mark), ("bore A", Mark::Accepted));
+        assert_eq!(
+            (name.as_str(), *mark),
+            ("bore A", OperatorVerdict::Accepted)
+        );
         assert_eq!(locked.as_ref().unwrap()["diameter"], 8.0);
         assert!(
             annotations.of("two").features.is_empty(),

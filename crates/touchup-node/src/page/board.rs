@@ -20,15 +20,15 @@ const MOST_KEPT: usize = 1000;
 
 /// The newest message of a topic, and its number among all messages.
 #[derive(Debug)]
-struct Newest<M>(u64, Option<M>);
+struct NewestMessage<M>(u64, Option<M>);
 
-impl<M> Default for Newest<M> {
+impl<M> Default for NewestMessage<M> {
     fn default() -> Self {
         Self(0, None)
     }
 }
 
-impl<M: Serialize> Newest<M> {
+impl<M: Serialize> NewestMessage<M> {
     fn write(&mut self, number: u64, message: M) {
         *self = Self(number, Some(message));
     }
@@ -45,22 +45,23 @@ impl<M: Serialize> Newest<M> {
 /// `{"topic": …, "message": …}`; non-finite numbers become `null`.
 pub(super) fn text_of(topic: &str, message: &impl Serialize) -> Option<String> {
     #[derive(Serialize)]
-    struct Shown<'a, M> {
+    struct TopicMessage<'a, M> {
         topic: &'a str,
         message: &'a M,
     }
-    serde_json::to_string(&Shown { topic, message }).ok()
+    serde_json::to_string(&TopicMessage { topic, message }).ok()
 }
 
+/// Newest messages of each topic, for pages that come later.
 #[derive(Debug, Default)]
-struct Topics {
+struct BoardMessages {
     /// number of messages
     written: u64,
-    features: Newest<FeatureArray>,
-    tip: Newest<MarkerArray>,
-    path: Newest<Path>,
-    mismatch: Newest<HapticMismatch>,
-    diagnostics: Newest<DiagnosticArray>,
+    features: NewestMessage<FeatureArray>,
+    tip: NewestMessage<MarkerArray>,
+    path: NewestMessage<Path>,
+    mismatch: NewestMessage<HapticMismatch>,
+    diagnostics: NewestMessage<DiagnosticArray>,
     results: VecDeque<(u64, ProbeResult)>,
     touches: VecDeque<(u64, ProbeTouch)>,
 }
@@ -74,7 +75,7 @@ fn keep<M>(kept: &mut VecDeque<(u64, M)>, number: u64, message: M) {
 
 /// Vertex uncertainties and outlier marks at one state, as frames for the pages.
 #[derive(Debug)]
-pub(super) struct Known {
+pub(super) struct UncertaintyFrames {
     pub state: MeshState,
     pub frames: Vec<Vec<u8>>,
 }
@@ -83,8 +84,8 @@ pub(super) struct Known {
 #[derive(Debug)]
 pub(super) struct Board {
     mesh: Mutex<MeshCopy>,
-    topics: Mutex<Topics>,
-    known: Mutex<Option<Arc<Known>>>,
+    topics: Mutex<BoardMessages>,
+    known: Mutex<Option<Arc<UncertaintyFrames>>>,
     changes: watch::Sender<()>,
 }
 
@@ -195,13 +196,13 @@ impl Board {
     }
 
     /// Sets the vertex uncertainties of a state.
-    pub fn set_known(&self, known: Known) {
+    pub fn set_known(&self, known: UncertaintyFrames) {
         *locked(&self.known) = Some(Arc::new(known));
         self.wake();
     }
 
     /// The vertex uncertainties, if they are of the present state of the mesh.
-    pub fn known(&self) -> Option<Arc<Known>> {
+    pub fn known(&self) -> Option<Arc<UncertaintyFrames>> {
         let known = locked(&self.known).clone()?;
         (known.state == self.shape_state()).then_some(known)
     }

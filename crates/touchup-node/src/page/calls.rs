@@ -14,8 +14,8 @@ use crate::ros::port::Reply;
 use crate::ros::services::{Serves, serve};
 
 /// Reply to a request, now or later; `Err`: the reason of a failure, in words.
-pub(super) type Answer = Reply<Result<Value, String>>;
-type Service = Mutex<Box<dyn FnMut(Value, Answer) + Send>>;
+pub(super) type CallReply = Reply<Result<Value, String>>;
+type PageService = Mutex<Box<dyn FnMut(Value, CallReply) + Send>>;
 
 /// Reason of a refused call.
 pub(super) const MAY_ONLY_LOOK: &str =
@@ -27,7 +27,7 @@ const MOVES: &[&str] = &["~/probe_feature", "~/probe_all"];
 
 /// The services by name.
 pub(super) struct Calls {
-    services: BTreeMap<&'static str, Service>,
+    services: BTreeMap<&'static str, PageService>,
     inbox: Inbox,
 }
 
@@ -48,7 +48,7 @@ impl Calls {
     /// Calls a service; errors come as a reply too.
     ///
     /// - `request`: its fields; missing ones are zero, empty or false.
-    pub fn call(&self, role: Role, name: &str, request: Value, reply: Answer) {
+    pub fn call(&self, role: Role, name: &str, request: Value, reply: CallReply) {
         let Some((known, service)) = self.services.get_key_value(name) else {
             return reply.send(Err(format!("there is no service \"{name}\"")));
         };
@@ -65,7 +65,7 @@ impl Calls {
         (locked(service))(request, reply);
     }
 
-    fn held_until_answered(&self, reply: Answer) -> Answer {
+    fn held_until_answered(&self, reply: CallReply) -> CallReply {
         let inbox = self.inbox.clone();
         Reply::new(move |answer| {
             inbox.stops().end_hold();
@@ -83,7 +83,7 @@ where
         name: &'static str,
         mut call: impl FnMut(S::Request, Reply<S::Response>) + Send + 'static,
     ) -> Result<(), RosError> {
-        let service = move |request: Value, reply: Answer| match filled::<S::Request>(request) {
+        let service = move |request: Value, reply: CallReply| match filled::<S::Request>(request) {
             Ok(request) => call(
                 request,
                 Reply::new(move |answer: S::Response| {

@@ -36,7 +36,7 @@ const MESH_PATCH: u8 = 1;
 
 /// Message from a page: a service call, or a hold-to-run beat.
 #[derive(Debug, Deserialize)]
-struct Asked {
+struct PageMessage {
     /// identifies the answer
     #[serde(default)]
     id: Value,
@@ -80,7 +80,7 @@ pub(super) async fn serve(socket: WebSocket, site: Arc<Site>, role: Role) {
 fn hear(text: &str, site: &Site, role: Role, answers: &Sender<String>) {
     let asked = serde_json::from_str(text).map_err(|error| error.to_string());
     let (id, call, request) = match asked {
-        Ok(Asked {
+        Ok(PageMessage {
             call: None,
             beat: Some(_),
             ..
@@ -90,7 +90,7 @@ fn hear(text: &str, site: &Site, role: Role, answers: &Sender<String>) {
             }
             return;
         }
-        Ok(Asked {
+        Ok(PageMessage {
             id,
             call: Some(call),
             request,

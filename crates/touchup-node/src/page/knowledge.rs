@@ -11,7 +11,7 @@ use tokio::sync::oneshot;
 use tokio::time::sleep;
 
 use super::background::begin;
-use super::board::Known;
+use super::board::UncertaintyFrames;
 use super::mesh_copy::{MeshState, OF_A_MESSAGE, TouchedVertex};
 use super::site::Site;
 use super::vertex_numbers::{VertexNumber, frame};
@@ -55,7 +55,7 @@ pub(super) async fn follow(site: Arc<Site>) {
             continue;
         };
         if let Ok(frames) = evaluated.await {
-            site.board.set_known(Known { state, frames });
+            site.board.set_known(UncertaintyFrames { state, frames });
         }
     }
 }

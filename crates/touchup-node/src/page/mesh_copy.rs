@@ -40,7 +40,7 @@ pub(super) type PageId = u64;
 
 /// Missing parts of one page.
 #[derive(Debug, Default)]
-struct Lacking {
+struct PageBacklog {
     vertices: IdSet,
     faces: IdSet,
     /// the page's state; 0: none
@@ -66,7 +66,7 @@ pub(super) struct MeshCopy {
     corners: Vec<[u32; 3]>,
     /// vertices and faces in the version
     counts: [u32; 2],
-    pages: BTreeMap<PageId, Lacking>,
+    pages: BTreeMap<PageId, PageBacklog>,
     /// the whole state of a new session is incomplete: pages get no mesh
     is_coming: bool,
     /// changes that wait for the complete state
@@ -94,7 +94,7 @@ impl MeshCopy {
         let pages = std::mem::take(&mut self.pages);
         let pages = pages
             .into_keys()
-            .map(|page| (page, Lacking::default()))
+            .map(|page| (page, PageBacklog::default()))
             .collect();
         let (frame, session) = (patch.header.frame_id.clone(), patch.session.clone());
         *self = Self {
@@ -191,7 +191,7 @@ impl MeshCopy {
 
     /// Adds a page without any data.
     pub fn join(&mut self, page: PageId) {
-        let mut lacking = Lacking::default();
+        let mut lacking = PageBacklog::default();
         let vertices = (0..)
             .zip(&self.support)
             .filter(|(_, support)| **support != NO_VERTEX);

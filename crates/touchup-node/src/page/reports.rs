@@ -38,9 +38,9 @@ const WHOLE_WITHIN: Duration = Duration::from_secs(600);
 const SAVED_WITHIN: Duration = Duration::from_secs(120);
 
 /// Reason of a missing report.
-struct Refused(StatusCode, String);
+struct ReportRefusal(StatusCode, String);
 
-impl Refused {
+impl ReportRefusal {
     fn bad(why: impl ToString) -> Self {
         Self(StatusCode::BAD_REQUEST, why.to_string())
     }
@@ -65,14 +65,14 @@ pub(super) async fn make(
     }
     let asked = query
         .map(|Query(asked)| asked)
-        .map_err(|error| Refused::bad(error.body_text()));
+        .map_err(|error| ReportRefusal::bad(error.body_text()));
     let made = match asked {
         Ok(asked) => report(&site, &session, &asked, &headers, request.into_body()).await,
         Err(refused) => Err(refused),
     };
     match made {
         Ok(was_saved) => as_json(&json!({ "files": ReportFiles::NAMES, "was_saved": was_saved })),
-        Err(Refused(status, why)) => refusal(status, &why),
+        Err(ReportRefusal(status, why)) => refusal(status, &why),
     }
 }
 
@@ -83,31 +83,32 @@ async fn report(
     asked: &ReportRequest,
     headers: &HeaderMap,
     body: Body,
-) -> Result<bool, Refused> {
+) -> Result<bool, ReportRefusal> {
     let Ok(turn) = Arc::clone(&site.reports.turn).try_acquire_owned() else {
         let why = "another report is being made: ask again when it is there";
-        return Err(Refused(StatusCode::TOO_MANY_REQUESTS, why.to_owned()));
+        return Err(ReportRefusal(StatusCode::TOO_MANY_REQUESTS, why.to_owned()));
     };
     let is_current = session == site.board.session();
     let folder = SessionFolder::open(&site.session_folder, session);
-    let session = folder.map_err(|error| Refused(StatusCode::NOT_FOUND, error.to_string()))?;
+    let session =
+        folder.map_err(|error| ReportRefusal(StatusCode::NOT_FOUND, error.to_string()))?;
     let own_unit = SessionFacts::read(session.path())
         .ok()
         .map(|facts| facts.mesh_unit);
     let mesh_unit = own_unit.unwrap_or_default();
-    let mut params = asked.params(mesh_unit).map_err(Refused::bad)?;
+    let mut params = asked.params(mesh_unit).map_err(ReportRefusal::bad)?;
     let nominal = match asked.nominal {
         NominalSource::Upload => {
             NominalFile::HandedIn(whole_within(handed_in(&session, asked, headers, body)).await?)
         }
         NominalSource::Session => {
-            NominalFile::File(asked.in_session(&session).map_err(Refused::bad)?)
+            NominalFile::File(asked.in_session(&session).map_err(ReportRefusal::bad)?)
         }
         NominalSource::Part => {
             let part = site.reports.part.clone();
             params.drawing.unit = site.reports.mesh_unit;
             NominalFile::File(part.ok_or_else(|| {
-                Refused::bad(
+                ReportRefusal::bad(
                     "the node has no nominal part: hand in one, or start it with --web-nominal",
                 )
             })?)
@@ -128,18 +129,19 @@ async fn report(
         drop(turn);
         made
     });
-    let made = made.map_err(Refused::unavailable)?.await;
-    let made = made
-        .map_err(|_| Refused::unavailable("the report was not made, by a fault of the program"))?;
-    made.map(|()| is_current).map_err(Refused::bad)
+    let made = made.map_err(ReportRefusal::unavailable)?.await;
+    let made = made.map_err(|_| {
+        ReportRefusal::unavailable("the report was not made, by a fault of the program")
+    })?;
+    made.map(|()| is_current).map_err(ReportRefusal::bad)
 }
 
 /// The upload, within its time-out.
-async fn whole_within<F: Future<Output = Result<HandedIn, Refused>>>(
+async fn whole_within<F: Future<Output = Result<HandedIn, ReportRefusal>>>(
     file: F,
-) -> Result<HandedIn, Refused> {
+) -> Result<HandedIn, ReportRefusal> {
     let late = |_| {
-        Refused::bad(format!(
+        ReportRefusal::bad(format!(
             "the file did not come whole within {} s",
             WHOLE_WITHIN.as_secs()
         ))
@@ -153,10 +155,10 @@ async fn handed_in(
     asked: &ReportRequest,
     headers: &HeaderMap,
     body: Body,
-) -> Result<HandedIn, Refused> {
-    let (name, most) = asked.upload().map_err(Refused::bad)?;
+) -> Result<HandedIn, ReportRefusal> {
+    let (name, most) = asked.upload().map_err(ReportRefusal::bad)?;
     let too_large = || {
-        Refused(
+        ReportRefusal(
             StatusCode::PAYLOAD_TOO_LARGE,
             format!("{name} may have up to {} MB", most >> 20),
         )
@@ -167,23 +169,24 @@ async fn handed_in(
     if length.is_some_and(|length| length > most) {
         return Err(too_large());
     }
-    let mut file = HandedIn::new(session, name, most).map_err(Refused::bad)?;
+    let mut file = HandedIn::new(session, name, most).map_err(ReportRefusal::bad)?;
     let mut pieces = body.into_data_stream();
     loop {
         let piece = timeout(PIECE_WITHIN, pieces.next()).await;
-        let Some(piece) = piece.map_err(|_| Refused::bad(format!("{name} did not come whole")))?
+        let Some(piece) =
+            piece.map_err(|_| ReportRefusal::bad(format!("{name} did not come whole")))?
         else {
             return Ok(file);
         };
-        let piece =
-            piece.map_err(|error| Refused::bad(format!("{name} did not come whole: {error}")))?;
+        let piece = piece
+            .map_err(|error| ReportRefusal::bad(format!("{name} did not come whole: {error}")))?;
         // the disk may be slow
         let added = tokio::task::spawn_blocking(move || file.add(&piece).map(|()| file)).await;
         file = match added.map_err(io::Error::other).flatten() {
             Ok(file) => file,
             Err(error) if error.kind() == io::ErrorKind::FileTooLarge => return Err(too_large()),
             Err(error) => {
-                return Err(Refused::unavailable(format!(
+                return Err(ReportRefusal::unavailable(format!(
                     "{name} could not be written: {error}"
                 )));
             }
@@ -192,7 +195,7 @@ async fn handed_in(
 }
 
 /// Makes the node save its session.
-async fn save(site: &Site) -> Result<(), Refused> {
+async fn save(site: &Site) -> Result<(), ReportRefusal> {
     let (to, saved) = oneshot::channel();
     let request = json!({ "overwrite": true, "with_features": true });
     site.call(
@@ -201,15 +204,15 @@ async fn save(site: &Site) -> Result<(), Refused> {
         request,
         Reply::new(move |answer| drop(to.send(answer))),
     );
-    let late = || Refused::unavailable("the session was not saved in time: ask again");
+    let late = || ReportRefusal::unavailable("the session was not saved in time: ask again");
     let answer = timeout(SAVED_WITHIN, saved)
         .await
         .map_err(|_| late())?
         .map_err(|_| late())?;
-    let answer = answer.map_err(Refused::unavailable)?;
+    let answer = answer.map_err(ReportRefusal::unavailable)?;
     match answer["success"].as_bool() {
         Some(true) => Ok(()),
-        _ => Err(Refused::unavailable(
+        _ => Err(ReportRefusal::unavailable(
             answer["message"].as_str().unwrap_or_default(),
         )),
     }

@@ -10,13 +10,13 @@ use serde_json::{Value, json};
 use super::access::Role;
 use super::annotations::{AnnotateRequest, Annotations};
 use super::board::Board;
-use super::calls::{Answer, Calls, MAY_ONLY_LOOK};
+use super::calls::{CallReply, Calls, MAY_ONLY_LOOK};
 use super::entrance::Entrance;
 use super::nominal::Nominal;
 use super::replay::ReplayControl;
 use super::report_work::Reports;
 use crate::ros::inbox::Inbox;
-use crate::ros::stop::Motion;
+use crate::ros::stop::ArmMotion;
 use touchup_geometry::mesh::{FaceTree, TriMesh};
 
 /// Reason of a refused call during a replay.
@@ -54,7 +54,7 @@ pub(super) struct ScanShown {
 #[derive(Debug, Serialize)]
 struct ArmShown {
     may_move: bool,
-    motion: Motion,
+    motion: ArmMotion,
     stays_because: Option<&'static str>,
 }
 
@@ -99,7 +99,7 @@ impl Site {
     }
 
     /// Calls a service of the page itself, or of the node.
-    pub fn call(&self, role: Role, name: &str, request: Value, reply: Answer) {
+    pub fn call(&self, role: Role, name: &str, request: Value, reply: CallReply) {
         if let Some(replay) = &self.replay {
             return reply.send(match name {
                 "~/replay" => replay.call(request),

@@ -11,7 +11,7 @@ use crate::ros::clock::RosClock;
 use crate::ros::inbox::Inbox;
 use crate::ros::names::NameError;
 use crate::ros::port::{MESH_PATCH_TOPIC, Port, Publication, Reply};
-use crate::ros::send_queue::{SendQueue, Sent};
+use crate::ros::send_queue::{SendOutcome, SendQueue};
 use touchup_session::threads::give_way;
 
 /// Reason why the node cannot communicate.
@@ -36,7 +36,7 @@ pub enum RosError {
 }
 
 /// State shared by the parts of a port.
-pub(super) struct Exchange {
+pub(super) struct PortState {
     pub inbox: Inbox,
     /// full name with its namespace
     pub node_name: String,
@@ -52,7 +52,7 @@ pub(super) struct Exchange {
     pub lost: [AtomicU64; 2],
 }
 
-impl Exchange {
+impl PortState {
     pub fn new(config: &NodeConfig, inbox: Inbox) -> Arc<Self> {
         Arc::new(Self {
             inbox,
@@ -89,12 +89,12 @@ impl Exchange {
     /// listener may delay it.
     pub fn senders(
         self: &Arc<Self>,
-        urgent: impl Fn(Publication) -> Sent<Publication> + Send + 'static,
-        mesh: impl Fn(Publication) -> Sent<Publication> + Send + 'static,
+        urgent: impl Fn(Publication) -> SendOutcome<Publication> + Send + 'static,
+        mesh: impl Fn(Publication) -> SendOutcome<Publication> + Send + 'static,
     ) -> io::Result<[JoinHandle<()>; 2]> {
         // urgent messages wait for nobody
         let urgent = move |publication| match urgent(publication) {
-            Sent::Later(_) => Sent::Refused,
+            SendOutcome::Later(_) => SendOutcome::Refused,
             sent => sent,
         };
         Ok([
@@ -134,12 +134,12 @@ pub(crate) fn join(threads: impl IntoIterator<Item = JoinHandle<()>>) {
 }
 
 /// A port at work; `_connection` leaves the network on drop.
-pub(super) struct Joined<C> {
-    pub exchange: Arc<Exchange>,
+pub(super) struct ConnectedPort<C> {
+    pub exchange: Arc<PortState>,
     pub _connection: C,
 }
 
-impl<C: Send + Sync> Port for Joined<C> {
+impl<C: Send + Sync> Port for ConnectedPort<C> {
     fn publish(&self, publication: Publication) {
         // the mesh, and touches with their curves, are large and may wait
         match publication {

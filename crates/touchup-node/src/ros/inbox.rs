@@ -24,9 +24,9 @@ const FULL: &str =
 /// Refusal of a call that comes too late.
 const ENDED: &str = "the node ends: nothing was done";
 
-/// State of the queue.
+/// Numbers of waiting arrivals, and whether the receiver is gone.
 #[derive(Debug, Default)]
-struct Waiting {
+struct InboxCounts {
     /// numbers of samples and of calls
     counts: [usize; 2],
     /// the receiver is gone
@@ -34,10 +34,10 @@ struct Waiting {
 }
 
 #[derive(Debug)]
-struct Shared {
+struct InboxState {
     /// for samples, for calls
     room: [usize; 2],
-    waiting: Mutex<Waiting>,
+    waiting: Mutex<InboxCounts>,
     /// signals a removal
     taken: Condvar,
     /// of wrenches and poses, of others
@@ -50,14 +50,14 @@ struct Shared {
 #[derive(Clone, Debug)]
 pub struct Inbox {
     to: Sender<Arrival>,
-    shared: Arc<Shared>,
+    shared: Arc<InboxState>,
 }
 
 /// Receiver of arrivals. On drop it refuses all waiting and later calls.
 #[derive(Debug)]
 pub struct Arrivals {
     from: Receiver<Arrival>,
-    shared: Arc<Shared>,
+    shared: Arc<InboxState>,
 }
 
 /// A sender and its receiver.
@@ -66,7 +66,7 @@ pub struct Arrivals {
 /// - `clock`: of the node
 pub fn inbox(samples: usize, clock: &Clock) -> (Inbox, Arrivals) {
     let (to, from) = channel();
-    let shared = Arc::new(Shared {
+    let shared = Arc::new(InboxState {
         room: [samples, MOST_CALLS],
         waiting: Mutex::default(),
         taken: Condvar::new(),
@@ -110,7 +110,7 @@ impl Inbox {
     /// As [`Self::put`], but waits for room. Returns whether the node still receives.
     pub fn put_patiently(&self, arrival: Arrival) -> bool {
         self.put_in(arrival, |shared, waiting, kind| {
-            let is_full = |waiting: &mut Waiting| {
+            let is_full = |waiting: &mut InboxCounts| {
                 !waiting.is_closed && waiting.counts[kind] >= shared.room[kind]
             };
             shared
@@ -123,7 +123,11 @@ impl Inbox {
     fn put_in<'a>(
         &'a self,
         arrival: Arrival,
-        wait: impl FnOnce(&'a Shared, MutexGuard<'a, Waiting>, usize) -> MutexGuard<'a, Waiting>,
+        wait: impl FnOnce(
+            &'a InboxState,
+            MutexGuard<'a, InboxCounts>,
+            usize,
+        ) -> MutexGuard<'a, InboxCounts>,
     ) -> bool {
         let Some(arrival) = self.stop(arrival) else {
             return true;

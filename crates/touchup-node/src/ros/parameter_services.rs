@@ -5,11 +5,11 @@
 
 use std::sync::{Arc, Mutex};
 
-use crate::ros::exchange::{Exchange, RosError};
+use crate::ros::exchange::{PortState, RosError};
 use crate::ros::locked;
 use crate::ros::messages::{self, *};
 use crate::ros::parameters::{
-    Allowed, PARAMETERS, ParameterValue, Parameters, Settable, descriptor,
+    PARAMETERS, ParameterDomain, ParameterValue, Parameters, Settable, descriptor,
 };
 use crate::ros::port::{Arrival, Reply};
 use crate::ros::services::{Serves, services};
@@ -29,7 +29,7 @@ type Announce = Box<dyn Fn(&str, &ParameterValue) + Send + Sync>;
 
 /// The public values.
 pub(super) struct PublicParameters {
-    exchange: Arc<Exchange>,
+    exchange: Arc<PortState>,
     values: Mutex<Parameters>,
     announce: Announce,
 }
@@ -55,7 +55,7 @@ services! {
 impl PublicParameters {
     /// - `announce`: publishes a change of a parameter.
     pub fn new(
-        exchange: &Arc<Exchange>,
+        exchange: &Arc<PortState>,
         values: &Parameters,
         announce: impl Fn(&str, &ParameterValue) + Send + Sync + 'static,
     ) -> Arc<Self> {
@@ -215,15 +215,15 @@ fn describe(name: &str) -> messages::ParameterDescriptor {
     described.description = declared.description.to_owned();
     described.read_only = declared.settable == Settable::AtStart;
     match declared.allowed {
-        Allowed::Double(_, from_value, to_value) => {
+        ParameterDomain::Double(_, from_value, to_value) => {
             described.floating_point_range = vec![FloatingPointRange {
                 from_value,
                 to_value,
                 step: 0.0,
             }];
         }
-        Allowed::OneOf(_, words) => described.additional_constraints = words.join(", "),
-        Allowed::Bool(_) | Allowed::String(_) | Allowed::SampleType(_) => {}
+        ParameterDomain::OneOf(_, words) => described.additional_constraints = words.join(", "),
+        ParameterDomain::Bool(_) | ParameterDomain::String(_) | ParameterDomain::SampleType(_) => {}
     }
     described
 }

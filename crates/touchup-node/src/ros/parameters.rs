@@ -73,7 +73,7 @@ impl fmt::Display for ParameterValue {
 
 /// Type, range and default of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Allowed {
+pub enum ParameterDomain {
     /// on or off
     Bool(bool),
     /// default, minimum and maximum; accepts whole numbers too
@@ -103,7 +103,7 @@ pub struct ParameterDescriptor {
     /// snake_case with the unit at its end
     pub name: &'static str,
     /// its type, default and range
-    pub allowed: Allowed,
+    pub allowed: ParameterDomain,
     /// time at which it is settable
     pub settable: Settable,
     /// its effect
@@ -120,10 +120,10 @@ pub const KIND_NAMES: [&str; 10] = [
 
 /// All parameters of the node, those of docs/ros.md and the common one of all nodes.
 pub const PARAMETERS: &[ParameterDescriptor] = {
-    use Allowed::{Bool, Double, OneOf, SampleType, String};
+    use ParameterDomain::{Bool, Double, OneOf, SampleType, String};
     const fn fixed(
         name: &'static str,
-        allowed: Allowed,
+        allowed: ParameterDomain,
         description: &'static str,
     ) -> ParameterDescriptor {
         ParameterDescriptor {
@@ -135,7 +135,7 @@ pub const PARAMETERS: &[ParameterDescriptor] = {
     }
     const fn live(
         name: &'static str,
-        allowed: Allowed,
+        allowed: ParameterDomain,
         description: &'static str,
     ) -> ParameterDescriptor {
         ParameterDescriptor {
@@ -340,12 +340,12 @@ impl ParameterDescriptor {
     /// The default value.
     pub fn default_value(&self) -> ParameterValue {
         match self.allowed {
-            Allowed::Bool(on) => ParameterValue::Bool(on),
-            Allowed::Double(number, ..) => ParameterValue::Double(number),
-            Allowed::String(word) | Allowed::OneOf(word, _) => {
+            ParameterDomain::Bool(on) => ParameterValue::Bool(on),
+            ParameterDomain::Double(number, ..) => ParameterValue::Double(number),
+            ParameterDomain::String(word) | ParameterDomain::OneOf(word, _) => {
                 ParameterValue::String(word.to_owned())
             }
-            Allowed::SampleType(_) => ParameterValue::String(String::new()),
+            ParameterDomain::SampleType(_) => ParameterValue::String(String::new()),
         }
     }
 
@@ -375,14 +375,14 @@ impl ParameterDescriptor {
     pub fn check(&self, value: &ParameterValue) -> Result<ParameterValue, ParameterError> {
         let name = self.name;
         match (self.allowed, value) {
-            (Allowed::Double(_, from, to), ParameterValue::Double(number)) => {
+            (ParameterDomain::Double(_, from, to), ParameterValue::Double(number)) => {
                 within(name, *number, from, to)
             }
             // exact up to 2^53, far beyond every range
-            (Allowed::Double(_, from, to), ParameterValue::Integer(whole)) => {
+            (ParameterDomain::Double(_, from, to), ParameterValue::Integer(whole)) => {
                 within(name, *whole as f64, from, to)
             }
-            (Allowed::OneOf(_, words), ParameterValue::String(word))
+            (ParameterDomain::OneOf(_, words), ParameterValue::String(word))
                 if !words.contains(&word.as_str()) =>
             {
                 Err(ParameterError::Word {
@@ -391,16 +391,17 @@ impl ParameterDescriptor {
                     words,
                 })
             }
-            (Allowed::SampleType(kind), ParameterValue::String(type_name)) => {
+            (ParameterDomain::SampleType(kind), ParameterValue::String(type_name)) => {
                 let known = LiveType::of(kind, type_name);
                 known
                     .map(|_| value.clone())
                     .map_err(|why| ParameterError::SampleType { name, why })
             }
-            (Allowed::Bool(_), ParameterValue::Bool(_))
-            | (Allowed::String(_) | Allowed::OneOf(..), ParameterValue::String(_)) => {
-                Ok(value.clone())
-            }
+            (ParameterDomain::Bool(_), ParameterValue::Bool(_))
+            | (
+                ParameterDomain::String(_) | ParameterDomain::OneOf(..),
+                ParameterValue::String(_),
+            ) => Ok(value.clone()),
             _ => {
                 let (wanted, given) = (self.default_value().type_name(), value.type_name());
                 Err(ParameterError::Type {

@@ -17,10 +17,10 @@ const MOST: usize = 4096;
 const MOST_TILES: usize = 8192;
 
 /// Sends an answer.
-pub(super) type Answer = Box<dyn FnOnce() + Send>;
+pub(super) type AnswerSender = Box<dyn FnOnce() + Send>;
 
 /// Outcome of sending a message.
-pub(super) enum Sent<M> {
+pub(super) enum SendOutcome<M> {
     /// in flight
     Done,
     /// dropped and counted
@@ -29,40 +29,42 @@ pub(super) enum Sent<M> {
     Later(M),
 }
 
-impl<M> Sent<M> {
+impl<M> SendOutcome<M> {
     /// Converts the message back to its publication.
-    pub fn map<T>(self, publication: impl FnOnce(M) -> T) -> Sent<T> {
+    pub fn map<T>(self, publication: impl FnOnce(M) -> T) -> SendOutcome<T> {
         match self {
-            Self::Done => Sent::Done,
-            Self::Refused => Sent::Refused,
-            Self::Later(message) => Sent::Later(publication(message)),
+            Self::Done => SendOutcome::Done,
+            Self::Refused => SendOutcome::Refused,
+            Self::Later(message) => SendOutcome::Later(publication(message)),
         }
     }
 }
 
-enum Outgoing {
-    Answer(Answer),
+enum OutgoingMessage {
+    Answer(AnswerSender),
     Publication(Box<Publication>),
 }
 
 #[derive(Default)]
-struct Waiting {
-    messages: VecDeque<Outgoing>,
+struct QueuedMessages {
+    messages: VecDeque<OutgoingMessage>,
     tiles: VecDeque<Box<Publication>>,
     is_closed: bool,
 }
 
-impl Waiting {
-    fn next(&mut self) -> Option<Outgoing> {
+impl QueuedMessages {
+    fn next(&mut self) -> Option<OutgoingMessage> {
         self.messages
             .pop_front()
-            .or_else(|| self.tiles.pop_front().map(Outgoing::Publication))
+            .or_else(|| self.tiles.pop_front().map(OutgoingMessage::Publication))
     }
 
     fn put_back(&mut self, publication: Box<Publication>) {
         match *publication {
             Publication::Tile(_) => self.tiles.push_front(publication),
-            _ => self.messages.push_front(Outgoing::Publication(publication)),
+            _ => self
+                .messages
+                .push_front(OutgoingMessage::Publication(publication)),
         }
     }
 }
@@ -70,7 +72,7 @@ impl Waiting {
 /// Outgoing messages, sent by one thread.
 #[derive(Default)]
 pub(super) struct SendQueue {
-    waiting: Mutex<Waiting>,
+    waiting: Mutex<QueuedMessages>,
     more: Condvar,
     /// tiles, others
     unsent: [AtomicU64; 2],
@@ -79,12 +81,12 @@ pub(super) struct SendQueue {
 impl SendQueue {
     /// Puts a publication in.
     pub fn put(&self, publication: Publication) {
-        self.put_in(Outgoing::Publication(Box::new(publication)));
+        self.put_in(OutgoingMessage::Publication(Box::new(publication)));
     }
 
     /// Puts an answer in.
-    pub fn answer(&self, answer: Answer) {
-        self.put_in(Outgoing::Answer(answer));
+    pub fn answer(&self, answer: AnswerSender) {
+        self.put_in(OutgoingMessage::Answer(answer));
     }
 
     /// Number dropped for slow listeners, or refused by ROS: tiles, others.
@@ -100,20 +102,20 @@ impl SendQueue {
     }
 
     /// Sends until it is closed and empty, or closed with a slow listener.
-    pub fn send(&self, publish: impl Fn(Publication) -> Sent<Publication>) {
+    pub fn send(&self, publish: impl Fn(Publication) -> SendOutcome<Publication>) {
         while let Some(message) = self.take() {
             let publication = match message {
-                Outgoing::Answer(send) => {
+                OutgoingMessage::Answer(send) => {
                     send();
                     continue;
                 }
-                Outgoing::Publication(publication) => *publication,
+                OutgoingMessage::Publication(publication) => *publication,
             };
             let is_tile = matches!(publication, Publication::Tile(_));
             match publish(publication) {
-                Sent::Done => {}
-                Sent::Refused => self.lose(is_tile),
-                Sent::Later(publication) => {
+                SendOutcome::Done => {}
+                SendOutcome::Refused => self.lose(is_tile),
+                SendOutcome::Later(publication) => {
                     let mut waiting = locked(&self.waiting);
                     waiting.put_back(Box::new(publication));
                     // a leaving port does not wait for slow listeners
@@ -135,10 +137,10 @@ impl SendQueue {
         self.unsent[usize::from(!is_tile)].fetch_add(1, Ordering::Relaxed);
     }
 
-    fn put_in(&self, message: Outgoing) {
+    fn put_in(&self, message: OutgoingMessage) {
         let mut waiting = locked(&self.waiting);
         match message {
-            Outgoing::Publication(tile) if matches!(*tile, Publication::Tile(_)) => {
+            OutgoingMessage::Publication(tile) if matches!(*tile, Publication::Tile(_)) => {
                 waiting.tiles.push_back(tile);
                 if waiting.tiles.len() > MOST_TILES {
                     waiting.tiles.pop_front();
@@ -152,8 +154,8 @@ impl SendQueue {
         self.more.notify_one();
     }
 
-    fn take(&self) -> Option<Outgoing> {
-        let is_idle = |waiting: &mut Waiting| {
+    fn take(&self) -> Option<OutgoingMessage> {
+        let is_idle = |waiting: &mut QueuedMessages| {
             waiting.messages.is_empty() && waiting.tiles.is_empty() && !waiting.is_closed
         };
         let waiting = self.more.wait_while(locked(&self.waiting), is_idle);
@@ -199,7 +201,7 @@ mod tests {
         queue.close();
         queue.send(|publication| {
             sent.lock().unwrap().push(name(&publication));
-            Sent::Done
+            SendOutcome::Done
         });
         sent.into_inner().unwrap()
     }
@@ -239,9 +241,9 @@ mod tests {
             }
             // every second attempt succeeds
             if tried.len() % 2 == 1 {
-                Sent::Later(publication)
+                SendOutcome::Later(publication)
             } else {
-                Sent::Done
+                SendOutcome::Done
             }
         });
         let tried = tried.into_inner().unwrap();
@@ -282,8 +284,8 @@ mod tests {
             .for_each(|publication| queue.put(publication));
         queue.close();
         queue.send(|publication| match publication {
-            Publication::MeshPatch(patch) if patch.version == 2 => Sent::Done,
-            _ => Sent::Refused,
+            Publication::MeshPatch(patch) if patch.version == 2 => SendOutcome::Done,
+            _ => SendOutcome::Refused,
         });
         assert_eq!(queue.unsent(), [1, 1]);
     }
@@ -294,7 +296,7 @@ mod tests {
         let (sent, heard) = mpsc::channel();
         let sending = std::thread::spawn({
             let queue = queue.clone();
-            move || queue.send(|_| Sent::Done)
+            move || queue.send(|_| SendOutcome::Done)
         });
         for number in [1, 2] {
             let sent = sent.clone();

@@ -35,7 +35,7 @@ pub const LONGEST_BEAT: Duration = Duration::from_millis(120);
 /// Current motion of the arm.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Motion {
+pub enum ArmMotion {
     /// The arm rests.
     #[default]
     Rests,
@@ -66,7 +66,7 @@ struct Stops {
     stay: Option<&'static str>,
     /// whether `~/recover` was called after that
     is_recovery_asked: bool,
-    motion: Motion,
+    motion: ArmMotion,
     thread: ArmThread,
     /// the last beat of a held button, if any
     beat: Option<Instant>,
@@ -84,8 +84,8 @@ impl Stops {
 
     /// Whether the arm retracts, by an earlier request or by itself.
     fn goes_back(&self) -> bool {
-        self.motion == Motion::Retracts
-            || (self.motion == Motion::Moves && self.request().is_some())
+        self.motion == ArmMotion::Retracts
+            || (self.motion == ArmMotion::Moves && self.request().is_some())
     }
 
     fn stay(&mut self, why: &'static str) {
@@ -131,7 +131,7 @@ impl StopState {
             may_move: true,
             stay: None,
             is_recovery_asked: false,
-            motion: Motion::Rests,
+            motion: ArmMotion::Rests,
             thread: ArmThread::None,
             beat: None,
             held_orders: 0,
@@ -242,7 +242,7 @@ impl StopState {
 
     /// State of the arm: whether it may move, its motion, and the reason if it stays stopped;
     /// `None` without an arm.
-    pub fn arm(&self) -> Option<(bool, Motion, Option<&'static str>)> {
+    pub fn arm(&self) -> Option<(bool, ArmMotion, Option<&'static str>)> {
         let stops = locked(&self.stops);
         (!matches!(stops.thread, ArmThread::None)).then_some((
             stops.may_move,
@@ -259,7 +259,7 @@ impl StopState {
             stops.is_ending = true;
             return true;
         }
-        let is_new = stops.motion != Motion::Rests && stops.stay.is_none();
+        let is_new = stops.motion != ArmMotion::Rests && stops.stay.is_none();
         if is_new {
             stops.stay("the end of the node was asked for again");
         }
@@ -312,7 +312,7 @@ impl StopState {
     }
 
     /// Sets the motion of the arm.
-    pub fn enter(&self, motion: Motion) {
+    pub fn enter(&self, motion: ArmMotion) {
         locked(&self.stops).motion = motion;
     }
 
@@ -461,7 +461,7 @@ mod tests {
     fn the_end_is_asked_for_again_only_where_an_arm_moves() {
         let state = StopState::new(Clock::system());
         assert!(state.interrupt() && !state.interrupt());
-        state.enter(Motion::Retracts);
+        state.enter(ArmMotion::Retracts);
         assert_eq!(state.request(), Some(StopRequest::Retract));
         assert!(
             state.interrupt() && !state.interrupt(),

@@ -1,14 +1,14 @@
 //! The topics of docs/ros.md, each with its quality of service.
 
 use crate::ros::arguments::NodeConfig;
-use crate::ros::exchange::{Exchange, RosError};
+use crate::ros::exchange::{PortState, RosError};
 use crate::ros::messages::{
     Clock, DiagnosticArray, FeatureArray, HapticMismatch, Marker, MarkerArray, MeshPatch, Path,
     PointStamped, ProbeResult, ProbeTouch, TFMessage,
 };
 use crate::ros::port::{Arrival, MESH_PATCH_TOPIC, Publication};
 use crate::ros::sample_source::SampleSource;
-use crate::ros::send_queue::Sent;
+use crate::ros::send_queue::SendOutcome;
 use touchup_io::recording::SampleKind;
 
 /// A topic and its quality of service.
@@ -62,7 +62,7 @@ pub(super) const MESH_PATCH: Topic = Topic::reliable(MESH_PATCH_TOPIC, 4096);
 const SAMPLES: usize = 2048;
 
 /// Sends messages of one topic.
-pub(super) type Publisher<M> = Box<dyn Fn(M) -> Sent<M> + Send>;
+pub(super) type Publisher<M> = Box<dyn Fn(M) -> SendOutcome<M> + Send>;
 
 /// A back end that publishes messages of one type.
 pub(super) trait Publishes<M> {
@@ -76,7 +76,7 @@ pub(super) trait Subscribes<M> {
     fn subscribe(
         &mut self,
         topic: Topic,
-        arrival: fn(&Exchange, M) -> Arrival,
+        arrival: fn(&PortState, M) -> Arrival,
     ) -> Result<(), RosError>;
 }
 
@@ -98,7 +98,7 @@ macro_rules! publishers {
             Ok(Box::new(move |publication| match publication {
                 $(Publication::$publication(message) => $send(message).map(Publication::$publication),)+
                 // others have a send queue of their own
-                _ => Sent::Done,
+                _ => SendOutcome::Done,
             }))
         }
     };
@@ -169,7 +169,7 @@ mod tests {
     impl<M> Publishes<M> for Announced {
         fn publisher(&mut self, topic: Topic) -> Result<Publisher<M>, RosError> {
             self.0.push(topic);
-            Ok(Box::new(|_| Sent::Done))
+            Ok(Box::new(|_| SendOutcome::Done))
         }
     }
 

@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, SVector, Vector3};
 
 use super::brake_plan::BrakePlan;
 use super::params::Ros2ControlParams;
-use super::reader::{JointSample, Measured, StateReader};
+use super::reader::{ArmSample, JointSample, StateReader};
 use crate::ros::port::ArmPort;
 use touchup_method::stylus::Wrench;
 use touchup_probing::arm::{
@@ -60,7 +60,7 @@ pub struct Ros2ControlArm {
     begun: Instant,
     /// median time between states, s
     period: f64,
-    last: Measured,
+    last: ArmSample,
     /// zero of the sensor in the flange
     tare: Wrench,
     plan: BrakePlan,
@@ -134,7 +134,7 @@ impl Ros2ControlArm {
     }
 
     /// Converts a measurement to the state of the trait.
-    fn seen(&self, measured: &Measured) -> ArmState {
+    fn seen(&self, measured: &ArmSample) -> ArmState {
         let pose_bf = self.params.geometry.flange(&measured.sample.joints);
         let free = self.unweighed(measured);
         let (force, torque) = (free.force - self.tare.force, free.torque - self.tare.torque);
@@ -154,7 +154,7 @@ impl Ros2ControlArm {
     }
 
     /// Reading of the sensor less the weight, in the flange.
-    fn unweighed(&self, measured: &Measured) -> Wrench {
+    fn unweighed(&self, measured: &ArmSample) -> Wrench {
         let r_bf = self
             .params
             .geometry
@@ -533,7 +533,7 @@ fn lasting([x, y, z, a, b, c]: &[f64; 6], acceleration: f64) -> f64 {
 fn rated(
     reader: &mut StateReader,
     params: &Ros2ControlParams,
-) -> Result<(Measured, f64), ArmError> {
+) -> Result<(ArmSample, f64), ArmError> {
     let mut last = reader.next(params, params.connect)?;
     let mut apart = Vec::with_capacity(RATED);
     for _ in 0..RATED {

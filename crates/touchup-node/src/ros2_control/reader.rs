@@ -34,7 +34,7 @@ pub(super) struct JointSample {
 
 /// Measurements of one moment.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Measured {
+pub(super) struct ArmSample {
     pub sample: JointSample,
     /// reading of the sensor, in the axes of the flange F about its origin
     pub wrench_f: Wrench,
@@ -96,7 +96,7 @@ impl StateReader {
         &mut self,
         params: &Ros2ControlParams,
         silent: Duration,
-    ) -> Result<Measured, ArmError> {
+    ) -> Result<ArmSample, ArmError> {
         loop {
             if let Some(measured) = self.paired(params)? {
                 return Ok(measured);
@@ -158,7 +158,7 @@ impl StateReader {
     }
 
     /// The oldest waiting joints, with the wrench nearest in time.
-    fn paired(&mut self, params: &Ros2ControlParams) -> Result<Option<Measured>, ArmError> {
+    fn paired(&mut self, params: &Ros2ControlParams) -> Result<Option<ArmSample>, ArmError> {
         let Some(sample) = self.waiting.front().copied() else {
             return Ok(None);
         };
@@ -190,7 +190,7 @@ impl StateReader {
             });
         }
         self.waiting.pop_front();
-        Ok(Some(Measured { sample, wrench_f }))
+        Ok(Some(ArmSample { sample, wrench_f }))
     }
 
     /// The arm's joints in a message; `None` for a message with none of them, such as a gripper's.

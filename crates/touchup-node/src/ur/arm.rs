@@ -15,10 +15,10 @@ use super::lateness::StartLateness;
 use super::params::UrParams;
 use super::priority;
 use super::probe::probe;
-use super::protocol::{Action, PERIOD, UrState, pose_of, vector_of};
+use super::protocol::{OrderAction, PERIOD, UrState, pose_of, vector_of};
 use touchup_method::stylus::Wrench;
 use touchup_probing::arm::{
-    Arm, ArmError, ArmState, Command, Freshness, Safety, Slowed, velocity_towards,
+    Arm, ArmError, ArmState, Command, Freshness, Safety, SpeedReduction, velocity_towards,
 };
 
 /// Number of states at the start from which the rate is measured.
@@ -192,7 +192,7 @@ impl Arm for UrArm {
         if safety != Safety::Normal {
             return Err(ArmError::Stopped { safety });
         }
-        self.client.ask(Action::Zero)?;
+        self.client.ask(OrderAction::Zero)?;
         self.client.forget_states();
         Ok(())
     }
@@ -200,7 +200,7 @@ impl Arm for UrArm {
     /// Always starts a new client: the program of the controller at once obeys registers left from
     /// before, and only a new client clears them first. Sets tool, payload and watchdog again. Does
     /// not zero the sensor, as the probe may still be pressed: back off, then
-    /// [`touchup_probing::arm::Watched::zero`].
+    /// [`touchup_probing::arm::SupervisedArm::zero`].
     fn recover(&mut self) -> Result<(), ArmError> {
         Self::unlock(&self.params)?;
         self.client
@@ -214,7 +214,7 @@ impl Arm for UrArm {
         PERIOD
     }
 
-    fn slowed(&self) -> Option<Slowed> {
+    fn slowed(&self) -> Option<SpeedReduction> {
         self.last.slowed()
     }
 }
@@ -250,7 +250,7 @@ pub(super) fn order_of(
     command: &Command,
     last: &UrState,
     params: &UrParams,
-) -> Result<Action, ArmError> {
+) -> Result<OrderAction, ArmError> {
     match *command {
         Command::Line {
             to,
@@ -262,7 +262,7 @@ pub(super) fn order_of(
             if !is_pose {
                 return Err(refused("a line", "its end is no pose"));
             }
-            Ok(Action::Move {
+            Ok(OrderAction::Move {
                 twist: velocity_towards(
                     &pose_of(last.pose),
                     &to,
@@ -277,7 +277,7 @@ pub(super) fn order_of(
             acceleration,
         } => {
             check(params, "a velocity", linear.norm(), acceleration)?;
-            Ok(Action::Move {
+            Ok(OrderAction::Move {
                 twist: [linear.x, linear.y, linear.z, 0.0, 0.0, 0.0],
                 acceleration,
             })
@@ -302,7 +302,7 @@ pub(super) fn order_of(
             let place = pose_of(last.pose).translation.vector;
             let frame = Isometry3::from_parts(place.into(), frame);
             let across = feed - axis * feed.dot(&axis);
-            Ok(Action::Press {
+            Ok(OrderAction::Press {
                 frame: vector_of(&frame),
                 force_n: force,
                 speed,
@@ -312,7 +312,7 @@ pub(super) fn order_of(
         }
         Command::Stop { deceleration } => {
             check(params, "a stop", 0.0, deceleration)?;
-            Ok(Action::Stop { deceleration })
+            Ok(OrderAction::Stop { deceleration })
         }
     }
 }

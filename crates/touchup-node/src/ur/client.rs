@@ -14,7 +14,7 @@ use super::guard::{ClientLoss, FAREWELL, Guard, GuardState, Halt, SharedGuard, Z
 use super::lateness::StartLateness;
 use super::params::UrParams;
 use super::priority;
-use super::protocol::{Action, Begin, ClientReport, Order, UrState, vector_of};
+use super::protocol::{Begin, ClientReport, Order, OrderAction, UrState, vector_of};
 use touchup_probing::arm::ArmError;
 use touchup_session::clock::Clock;
 
@@ -195,7 +195,7 @@ impl Client {
     }
 
     /// Sends an order without waiting for it.
-    pub fn order(&mut self, what: Action) -> Result<u64, ArmError> {
+    pub fn order(&mut self, what: OrderAction) -> Result<u64, ArmError> {
         let mut known = self.shared.known();
         if let Some(broken) = &known.broken {
             return Err(broken.error());
@@ -220,7 +220,7 @@ impl Client {
     }
 
     /// Sends an order and waits for its completion.
-    pub fn ask(&mut self, what: Action) -> Result<(), ArmError> {
+    pub fn ask(&mut self, what: OrderAction) -> Result<(), ArmError> {
         let number = self.order(what)?;
         let known = self.wait(ZEROING + FAREWELL, |known| known.done >= number);
         known

@@ -17,7 +17,9 @@ use nalgebra::Vector3;
 use super::dashboard::Dashboard;
 use super::lateness::Lateness;
 use super::params::Deadlines;
-use super::protocol::{Action, ClientReport, Link, PERIOD, ProgramState, UrState, pose_of};
+use super::protocol::{
+    ClientReport, OrderAction, PERIOD, ProgramState, RtdeConnection, UrState, pose_of,
+};
 use touchup_probing::arm::{ArmError, Obedience, OrderedMotion, Safety};
 use touchup_session::clock::{Clock, ManualClock};
 
@@ -177,16 +179,16 @@ impl ClientLoss {
 }
 
 /// Motion of an order as visible in the velocity of the arm.
-fn ordered(what: &Action) -> OrderedMotion {
+fn ordered(what: &OrderAction) -> OrderedMotion {
     match *what {
-        Action::Move {
+        OrderAction::Move {
             twist,
             acceleration,
         } => OrderedMotion::Move {
             twist,
             acceleration,
         },
-        Action::Press {
+        OrderAction::Press {
             frame,
             speed,
             feed,
@@ -201,8 +203,8 @@ fn ordered(what: &Action) -> OrderedMotion {
                 acceleration,
             }
         }
-        Action::Stop { deceleration } => OrderedMotion::Stop { deceleration },
-        Action::Zero => OrderedMotion::Stop {
+        OrderAction::Stop { deceleration } => OrderedMotion::Stop { deceleration },
+        OrderAction::Zero => OrderedMotion::Stop {
             deceleration: ZEROING_STOP,
         },
     }
@@ -234,12 +236,12 @@ impl GuardState {
     }
 
     /// Notes an order; returns its number.
-    pub fn send(&mut self, what: &Action, now: Instant) -> u64 {
+    pub fn send(&mut self, what: &OrderAction, now: Instant) -> u64 {
         self.sent += 1;
         self.waiting_since.get_or_insert(now);
         self.obedience
             .order(&ordered(what), now.saturating_duration_since(self.begun_at));
-        if *what == Action::Zero {
+        if *what == OrderAction::Zero {
             self.asked = Some(self.sent);
         }
         self.sent
@@ -341,8 +343,8 @@ impl GuardState {
             }
             ClientReport::Lost { which } => {
                 let what = match which {
-                    Link::States => "its states",
-                    Link::Control => "orders to it",
+                    RtdeConnection::States => "its states",
+                    RtdeConnection::Control => "orders to it",
                 };
                 return Some(ClientLoss::Arm(ArmError::Dropped { what }));
             }

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
-use touchup_probing::arm::{Safety, Slowed};
+use touchup_probing::arm::{Safety, SpeedReduction};
 
 /// The only supported and tested version of ur-rtde.
 pub const WHEEL: &str = "1.6.5";
@@ -39,13 +39,13 @@ pub struct Begin {
 pub struct Order {
     /// increases by one
     pub number: u64,
-    pub what: Action,
+    pub what: OrderAction,
 }
 
 /// Action of an order. The newest motion replaces those before; a zero happens whatever comes after
 /// it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub enum Action {
+pub enum OrderAction {
     /// Moves with a velocity, until the next order or until orders stop.
     Move { twist: [f64; 6], acceleration: f64 },
     /// Presses along z of a frame of B and moves with a velocity.
@@ -74,7 +74,7 @@ pub enum ClientReport {
     /// `Zero` is done.
     Done { number: u64 },
     /// The library lost a connection. Always the last line: after it nobody can trust the library.
-    Lost { which: Link },
+    Lost { which: RtdeConnection },
     /// No library, or another version.
     BadWheel { reason: String },
     /// The commanded tool is not in effect.
@@ -85,7 +85,7 @@ pub enum ClientReport {
 
 /// A connection of the library.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Link {
+pub enum RtdeConnection {
     States,
     Control,
 }
@@ -142,10 +142,10 @@ const FULL: f64 = 0.999;
 
 impl UrState {
     /// Reasons why the arm is slower than ordered.
-    pub fn slowed(&self) -> Option<Slowed> {
+    pub fn slowed(&self) -> Option<SpeedReduction> {
         let is_reduced = self.safety_bits & REDUCED_BIT != 0;
         let is_slow = is_reduced || self.speed_fraction < FULL;
-        is_slow.then_some(Slowed {
+        is_slow.then_some(SpeedReduction {
             slider_percent: self.speed_fraction * 100.0,
             is_reduced,
         })
@@ -278,7 +278,7 @@ pub(super) mod tests {
         assert!(!line.contains('\n'));
         let order = Order {
             number: 1,
-            what: Action::Move {
+            what: OrderAction::Move {
                 twist: [0.1; 6],
                 acceleration: 0.5,
             },

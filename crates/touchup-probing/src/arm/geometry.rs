@@ -7,7 +7,7 @@ use nalgebra::{Isometry3, Vector3, Vector6};
 
 use super::joints::{Joints, largest_turn};
 use super::kinematics::UrGeometry;
-use super::serial_chain::{Jacobian, SerialChain, Unreached, shortest};
+use super::serial_chain::{IkFailure, Jacobian, SerialChain, shortest};
 
 /// Geometry of an arm.
 #[derive(Clone, Debug, PartialEq)]
@@ -98,8 +98,8 @@ impl ArmGeometry {
     /// Joint angles within their ranges that bring the flange to a pose in B, nearest to `near`.
     ///
     /// # Errors
-    /// [`Unreached`]
-    pub fn nearest(&self, pose_bf: &Isometry3<f64>, near: &Joints) -> Result<Joints, Unreached> {
+    /// [`IkFailure`]
+    pub fn nearest(&self, pose_bf: &Isometry3<f64>, near: &Joints) -> Result<Joints, IkFailure> {
         match self {
             Self::Ur(ur) => {
                 let solutions = ur.inverse(pose_bf, six(near)).into_iter().map(Joints::from);
@@ -108,7 +108,7 @@ impl ArmGeometry {
                     unwound.filter(|joints| joints.iter().all(|angle| angle.abs() <= JOINT_RANGE));
                 let nearest =
                     in_range.min_by(|a, b| largest_turn(a, near).total_cmp(&largest_turn(b, near)));
-                nearest.ok_or(Unreached::Pose)
+                nearest.ok_or(IkFailure::Pose)
             }
             Self::Chain(chain) => chain.nearest(pose_bf, near),
         }

@@ -107,14 +107,14 @@ pub enum Command {
 
 /// Causes that slow an arm below its ordered speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Slowed {
+pub struct SpeedReduction {
     /// setting of the speed slider, %
     pub slider_percent: f64,
     /// whether the safety system is in reduced mode
     pub is_reduced: bool,
 }
 
-impl std::fmt::Display for Slowed {
+impl std::fmt::Display for SpeedReduction {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self {
             slider_percent,
@@ -321,7 +321,7 @@ pub trait Arm {
     fn period(&self) -> f64;
 
     /// Causes that slow the arm below its ordered speed, if it reports them.
-    fn slowed(&self) -> Option<Slowed> {
+    fn slowed(&self) -> Option<SpeedReduction> {
         None
     }
 }

@@ -11,7 +11,7 @@ use super::bodies::{ArmBodies, Link};
 use super::geometry::ArmGeometry;
 use super::interface::ArmState;
 use super::joints::Joints;
-use super::serial_chain::Unreached;
+use super::serial_chain::IkFailure;
 
 parameters! {
     /// Bounds of every motion, from the configuration alone. A request may ask for less
@@ -247,7 +247,7 @@ pub enum LimitError {
 
 /// The limits of a request; `None`: as configured.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Narrower {
+pub struct RequestLimits {
     /// largest force, N
     pub force: Option<f64>,
     /// largest speed, m/s
@@ -287,7 +287,7 @@ impl Limits {
     ///
     /// # Errors
     /// [`LimitError::Wider`], [`LimitError::NoLimit`].
-    pub fn narrowed(&self, by: &Narrower) -> Result<Self, LimitError> {
+    pub fn narrowed(&self, by: &RequestLimits) -> Result<Self, LimitError> {
         let narrower = |what, asked: Option<f64>, limit: f64, unit, per_si: f64| match asked {
             Some(asked) if asked.is_nan() || asked <= 0.0 => Err(LimitError::NoLimit {
                 what,
@@ -353,8 +353,8 @@ impl Limits {
         let joints = geometry
             .nearest(&(pose_bt * pose_ft.inverse()), near)
             .map_err(|unreached| match unreached {
-                Unreached::Pose => LimitError::Reach { place_mm },
-                Unreached::Range {
+                IkFailure::Pose => LimitError::Reach { place_mm },
+                IkFailure::Range {
                     joint,
                     range: [low, high],
                 } => LimitError::JointRange {

@@ -72,9 +72,9 @@ pub enum OrderedMotion {
     },
 }
 
-/// An ordered velocity.
+/// Velocity of an order to the arm.
 #[derive(Clone, Copy, Debug)]
-struct Ordered {
+struct CommandedVelocity {
     at: Duration,
     /// velocity, m/s in B
     linear: Vector3<f64>,
@@ -90,7 +90,7 @@ struct Ordered {
 #[derive(Debug)]
 pub struct Obedience {
     /// velocities without mass and delay, the newest last
-    ordered: VecDeque<Ordered>,
+    ordered: VecDeque<CommandedVelocity>,
     target: Vector3<f64>,
     /// acceleration of the newest order, m/s²
     acceleration: f64,
@@ -106,7 +106,7 @@ impl Obedience {
     ///
     /// - `now`: time since some moment, as all times here.
     pub fn new(now: Duration) -> Self {
-        let rest = Ordered {
+        let rest = CommandedVelocity {
             at: now,
             linear: Vector3::zeros(),
             turn: 0.0,
@@ -147,7 +147,7 @@ impl Obedience {
         (self.target, self.acceleration, self.ordered_at) = (target, acceleration, now);
         let linear = self.newest().linear;
         let rests = target == Vector3::zeros() && turn == 0.0 && press.is_none();
-        self.push(Ordered {
+        self.push(CommandedVelocity {
             at: now,
             linear,
             turn,
@@ -156,7 +156,7 @@ impl Obedience {
         });
     }
 
-    fn newest(&self) -> Ordered {
+    fn newest(&self) -> CommandedVelocity {
         // never empty
         self.ordered[self.ordered.len() - 1]
     }
@@ -171,7 +171,7 @@ impl Obedience {
             self.go_on(stale);
             (self.target, self.acceleration) = (Vector3::zeros(), REST);
             let linear = self.newest().linear;
-            self.push(Ordered {
+            self.push(CommandedVelocity {
                 at: stale,
                 linear,
                 turn: 0.0,
@@ -186,14 +186,14 @@ impl Obedience {
         let last = self.newest();
         let room = self.acceleration * now.saturating_sub(last.at).as_secs_f64();
         let linear = last.linear + (self.target - last.linear).cap_magnitude(room);
-        self.push(Ordered {
+        self.push(CommandedVelocity {
             at: now,
             linear,
             ..last
         });
     }
 
-    fn push(&mut self, ordered: Ordered) {
+    fn push(&mut self, ordered: CommandedVelocity) {
         self.ordered.push_back(ordered);
         // one older entry stays: it was in force when the window began
         while self
@@ -258,7 +258,7 @@ impl Obedience {
     }
 }
 
-impl Ordered {
+impl CommandedVelocity {
     /// Distance of a velocity from the range between rest and the ordered velocity, m/s.
     fn beyond(&self, velocity: &Vector3<f64>) -> f64 {
         let mut off = velocity - self.linear;

@@ -77,7 +77,7 @@ pub enum ChainError {
 
 /// Why a pose has no joint angles.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Unreached {
+pub enum IkFailure {
     /// too far, or in an impossible orientation
     Pose,
     /// reachable but for the range of a joint
@@ -367,16 +367,16 @@ impl SerialChain {
     /// ranges.
     ///
     /// # Errors
-    /// [`Unreached`]
+    /// [`IkFailure`]
     pub(super) fn nearest(
         &self,
         pose_bf: &Isometry3<f64>,
         near: &Joints,
-    ) -> Result<Joints, Unreached> {
+    ) -> Result<Joints, IkFailure> {
         let from = self.flange(near);
         let first = self.joints[0].origin.translation.vector;
         if (pose_bf.translation.vector - first).norm() > self.reach_of_all() {
-            return Err(Unreached::Pose);
+            return Err(IkFailure::Pose);
         }
         let unreached = match self.search(pose_bf, near) {
             Ok(found) => return Ok(found),
@@ -431,7 +431,7 @@ impl SerialChain {
     }
 
     /// Searches joint angles for a pose, from others.
-    fn search(&self, pose_bf: &Isometry3<f64>, from: &Joints) -> Result<Joints, Unreached> {
+    fn search(&self, pose_bf: &Isometry3<f64>, from: &Joints) -> Result<Joints, IkFailure> {
         let mut joints = from.mapped(|joint, angle| match self.joints[joint].range {
             Some([low, high]) => angle.clamp(low, high),
             None => angle,
@@ -468,12 +468,12 @@ impl SerialChain {
             .zip(joints.iter())
             .find_map(|(joint, angle)| {
                 let range = joint.range.filter(|ends| ends.contains(angle))?;
-                Some(Unreached::Range {
+                Some(IkFailure::Range {
                     joint: joint.name.clone(),
                     range,
                 })
             });
-        Err(held.unwrap_or(Unreached::Pose))
+        Err(held.unwrap_or(IkFailure::Pose))
     }
 
     /// Error of the flange: in units of the reach, and in rad, in B.

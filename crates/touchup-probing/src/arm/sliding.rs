@@ -8,7 +8,7 @@ use nalgebra::{Isometry3, Unit, UnitQuaternion, Vector3};
 
 use super::interface::{ArmState, Command};
 use super::touch_params::TouchParams;
-use super::watched::{ProbeError, TRIGGERS, Watched};
+use super::watched::{ProbeError, SupervisedArm, TRIGGERS};
 use crate::plan::Station;
 
 /// A planned slide, in B.
@@ -92,7 +92,7 @@ const PATIENCE: (f64, f64) = (3.0, 2.0);
 const SLIDING: &str = "sliding over the surface";
 
 /// Progress and contact of a slide.
-struct Slid<'a> {
+struct SlideProgress<'a> {
     target: &'a SlideTarget,
     params: &'a TouchParams,
     /// speed along the path, m/s
@@ -112,7 +112,7 @@ struct Slid<'a> {
     window: usize,
 }
 
-impl Slid<'_> {
+impl SlideProgress<'_> {
     /// Direction of the path at the current station, unit vector, and distance to the next station,
     /// m.
     fn ahead(&self) -> (Vector3<f64>, f64) {
@@ -207,7 +207,7 @@ impl Slid<'_> {
     }
 }
 
-impl Watched<'_> {
+impl SupervisedArm<'_> {
     /// Slides once. The ball ends clear of the surface, beside the last station reached.
     ///
     /// # Errors
@@ -234,7 +234,7 @@ impl Watched<'_> {
             self.limits.acceleration * self.arm.period(),
         );
         let (station, forces, none, against) = (0, Vec::new(), 0, 0);
-        let mut slid = Slid {
+        let mut slid = SlideProgress {
             target,
             params,
             speed,
@@ -300,7 +300,7 @@ impl Watched<'_> {
     }
 
     /// Presses until the force has its set value.
-    fn settle(&mut self, slid: &Slid<'_>) -> Result<(), ProbeError> {
+    fn settle(&mut self, slid: &SlideProgress<'_>) -> Result<(), ProbeError> {
         let doing = "pressing before a slide";
         let normal = slid.target.stations[0].normal;
         let begun_ns = self.next(doing)?.stamp_ns;
@@ -323,7 +323,7 @@ impl Watched<'_> {
         )
     }
 
-    fn go_along(&mut self, slid: &mut Slid<'_>) -> Result<SlideEnding, ProbeError> {
+    fn go_along(&mut self, slid: &mut SlideProgress<'_>) -> Result<SlideEnding, ProbeError> {
         let limit_s = PATIENCE.0 * slid.seconds() + PATIENCE.1;
         let mut state = self.next(SLIDING)?;
         slid.stamps_ns = [state.stamp_ns; 2];

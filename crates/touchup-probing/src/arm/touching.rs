@@ -6,13 +6,13 @@
 
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 
-use crate::plan::Expected;
+use crate::plan::ExpectedTravel;
 use touchup_geometry::numeric::mean;
 
 use super::interface::{ArmState, Command};
 use super::onset::{Onset, OnsetError, TouchMoment, find_onset};
 use super::touch_params::{CRAWL, TouchParams};
-use super::watched::{ProbeError, TRIGGERS, Watched};
+use super::watched::{ProbeError, SupervisedArm, TRIGGERS};
 
 /// A planned touch, in B.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,7 +24,7 @@ pub struct TouchTarget {
     /// Length of the search, m.
     pub search: f64,
     /// Position of the surface, predicted from earlier touches.
-    pub expected: Option<Expected>,
+    pub expected: Option<ExpectedTravel>,
 }
 
 /// The outcome of a touch.
@@ -67,7 +67,7 @@ pub struct TouchRecord {
     pub outcome: TouchOutcome,
 }
 
-impl Watched<'_> {
+impl SupervisedArm<'_> {
     /// Touches once. The arm ends at the stand-off.
     ///
     /// # Errors

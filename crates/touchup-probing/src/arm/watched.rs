@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 
 use nalgebra::{Isometry3, Vector3};
 
-use super::interface::{Arm, ArmError, ArmState, Command, Safety, Slowed};
+use super::interface::{Arm, ArmError, ArmState, Command, Safety, SpeedReduction};
 use super::limits::{LimitError, Limits};
 use super::liveness::{Liveness, StuckForce};
 use super::measured_motion::MeasuredMotion;
@@ -156,7 +156,7 @@ pub enum ProbeError {
         /// time limit, s
         limit_s: f64,
         /// causes, if the arm reports them
-        slowed: Option<Slowed>,
+        slowed: Option<SpeedReduction>,
     },
     /// A stop on request.
     #[error("cancelled while {doing}")]
@@ -232,7 +232,7 @@ pub trait Observer {
 }
 
 /// A supervised arm.
-pub struct Watched<'a> {
+pub struct SupervisedArm<'a> {
     pub(super) arm: &'a mut dyn Arm,
     pub(crate) limits: Limits,
     observer: &'a mut dyn Observer,
@@ -250,7 +250,7 @@ pub struct Watched<'a> {
     comes_free: bool,
 }
 
-impl<'a> Watched<'a> {
+impl<'a> SupervisedArm<'a> {
     /// - `observer`: receives each state, and may stop the arm.
     pub fn new(arm: &'a mut dyn Arm, limits: Limits, observer: &'a mut dyn Observer) -> Self {
         let (peak_force, heeds) = (0.0, StopRequest::Retract);
@@ -537,7 +537,7 @@ impl<'a> Watched<'a> {
         speed: f64,
         params: &TouchParams,
         trigger: &mut dyn FnMut(f64) -> f64,
-    ) -> Result<Option<Met>, ProbeError> {
+    ) -> Result<Option<ObstacleContact>, ProbeError> {
         let place = to.translation.vector;
         self.limits
             .check_place(&place)
@@ -580,7 +580,7 @@ impl<'a> Watched<'a> {
         let aside = self.come_free(&command)?;
         let force_n = self.peak_force;
         self.peak_force = before.max(force_n);
-        Ok(Some(Met {
+        Ok(Some(ObstacleContact {
             place,
             force_n,
             is_link: speed > params.safe_speed(),
@@ -774,7 +774,7 @@ impl<'a> Watched<'a> {
 }
 
 /// An obstacle in free air.
-struct Met {
+struct ObstacleContact {
     /// position of the tip at the contact, m in B
     place: Vector3<f64>,
     /// largest force until the arm stood, N
@@ -785,7 +785,7 @@ struct Met {
     aside: Option<Vector3<f64>>,
 }
 
-impl Met {
+impl ObstacleContact {
     fn obstacle(&self, doing: &'static str) -> ProbeError {
         let Self {
             place,

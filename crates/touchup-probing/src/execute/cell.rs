@@ -9,7 +9,7 @@ use touchup_geometry::numeric::turned_to;
 
 /// A robot cell.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Cell {
+pub struct RobotCell {
     /// geometry of the arm
     pub geometry: ArmGeometry,
     /// pose of the part in the base: maps O to B
@@ -26,7 +26,7 @@ const LEANS: f64 = 0.26;
 /// Height of a simulated tip above the part at its start, m.
 const ABOVE: f64 = 40e-3;
 
-impl Cell {
+impl RobotCell {
     /// Pose of the tip in B with the ball's centre at a place of O.
     pub fn pose(&self, rotation: &UnitQuaternion<f64>, centre: &Point3<f64>) -> Isometry3<f64> {
         Isometry3::from_parts((self.pose_bo * centre).coords.into(), *rotation)

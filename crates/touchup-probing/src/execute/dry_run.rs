@@ -2,10 +2,10 @@
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
-use super::cell::Cell;
+use super::cell::RobotCell;
 use super::ending::Ending;
 use super::prober::{Flag, ProbeParams};
-use super::route::{FreeSpace, ToolState};
+use super::route::{ArmFreeSpace, ToolState};
 use super::way_out::WayOut;
 use super::world::{World, distance};
 use crate::arm::{ArmState, LimitError, Safety};
@@ -50,7 +50,7 @@ pub struct Plan {
     pub held_back: Vec<HeldBack>,
 }
 
-impl Cell {
+impl RobotCell {
     /// The arm at rest without load, with its tip at a pose in B and the joints of largest
     /// dexterity; for a plan without an arm. `None` out of reach.
     pub fn at_rest(&self, pose_bt: &Isometry3<f64>) -> Option<ArmState> {
@@ -81,7 +81,7 @@ impl Cell {
 /// [`ExploreError`] without a pattern for the flag.
 #[expect(clippy::too_many_lines)]
 pub fn plan(
-    cell: &Cell,
+    cell: &RobotCell,
     params: &ProbeParams,
     world: &dyn World,
     flag: &Flag,
@@ -91,7 +91,7 @@ pub fn plan(
     let way_out = way_out.filter(|way_out| way_out.begins_at(now));
     let in_free_air = way_out.map_or(*now, |way_out| way_out.end(cell, now));
     let (mut explorer, rotation) = flag.explorer(cell, params, world, &in_free_air)?;
-    let space = FreeSpace {
+    let space = ArmFreeSpace {
         cell,
         limits: &params.limits,
         world,

@@ -6,7 +6,7 @@ use nalgebra::Point3;
 
 use super::links::LinkError;
 use crate::arm::{LimitError, ProbeError, SlideRecord, StopRequest, TouchRecord};
-use crate::plan::{DecidedCharacteristic, ExploreError, Found, Slide, TouchPlan};
+use crate::plan::{DecidedCharacteristic, ExplorationResult, ExploreError, Slide, TouchPlan};
 
 /// How a probing ended; as an error, why it ended early.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -158,13 +158,13 @@ pub struct ReferenceTouch {
 
 /// The result of a flag.
 #[derive(Clone, Debug)]
-pub struct Probed {
+pub struct FlagResult {
     /// number of the flag
     pub flag: u32,
     /// its ending
     pub ending: Ending,
     /// the feature, also after an early ending
-    pub found: Option<Found>,
+    pub found: Option<ExplorationResult>,
     /// all touches, in order
     pub touches: Vec<ProbedTouch>,
     /// slides after the touches

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion};
 
-use super::ending::{Ending, Probed, ProbedSlide, ProbedTouch, ReferenceTouch};
+use super::ending::{Ending, FlagResult, ProbedSlide, ProbedTouch, ReferenceTouch};
 use super::prober::{Flag, Prober};
 use super::route::ToolState;
 use super::way_out::WayOut;
@@ -57,13 +57,13 @@ const ANEW: f64 = 1e-3;
 impl<'a> Prober<'a> {
     /// Probes one flagged feature. In any case the arm has stopped at the return, and has retracted
     /// unless it may no longer move.
-    pub fn probe(&mut self, flag: &Flag) -> Probed {
+    pub fn probe(&mut self, flag: &Flag) -> FlagResult {
         let (mut explorer, mut probing) = match self.begin(flag) {
             Ok(begun) => begun,
             Err(ending) => {
                 let (touches, slides, references) = (Vec::new(), Vec::new(), Vec::new());
                 let (found, left_out, seconds, peak_force) = (None, Vec::new(), 0.0, 0.0);
-                return Probed {
+                return FlagResult {
                     flag: flag.id,
                     ending,
                     found,
@@ -104,7 +104,7 @@ impl<'a> Prober<'a> {
             }
             (Ok(()), Err(error)) => Ending::NothingFound(error.clone()),
         };
-        Probed {
+        FlagResult {
             flag: flag.id,
             // it is unknown which of its touches hold
             found: found.ok().filter(|_| !ending.is_displaced()),

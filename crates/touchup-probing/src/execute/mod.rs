@@ -24,10 +24,10 @@ mod touched_again;
 mod way_out;
 mod world;
 
-pub use cell::Cell;
-pub use cone::{NotReached, Orientation};
+pub use cell::RobotCell;
+pub use cone::{NotReached, ShaftOrientation};
 pub use dry_run::{HeldBack, Plan, PlannedMotion, plan};
-pub use ending::{Ending, Probed, ProbedSlide, ProbedTouch, ReferenceTouch};
+pub use ending::{Ending, FlagResult, ProbedSlide, ProbedTouch, ReferenceTouch};
 pub use links::{Clearance, LinkError, Tool};
 pub use payload::{PayloadProbeError, PayloadReadings};
 pub use prober::{Flag, ProbeParams, Prober};

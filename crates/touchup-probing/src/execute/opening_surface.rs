@@ -28,7 +28,7 @@ const ALIKE: f64 = 0.9;
 const IN_OPENING: f64 = 1.5e-3;
 
 /// Places of a ring, seen from outside along the normal, in the frame of the flag; `None` if open.
-type Ring = [Option<Point3<f64>>; DIRECTIONS];
+type OpeningRing = [Option<Point3<f64>>; DIRECTIONS];
 
 /// A plane in the frame of the flag.
 #[derive(Clone, Copy)]
@@ -58,7 +58,7 @@ impl LevelPlane {
     }
 
     /// Plane of most places of a ring, if they are enough.
-    fn of_ring(ring: &Ring) -> Option<Self> {
+    fn of_ring(ring: &OpeningRing) -> Option<Self> {
         let count = |plane: &Self| {
             ring.iter()
                 .flatten()
@@ -79,7 +79,7 @@ impl LevelPlane {
     }
 
     /// Least-squares plane through all places on it.
-    fn refined(self, rings: &[Ring]) -> Option<Self> {
+    fn refined(self, rings: &[OpeningRing]) -> Option<Self> {
         let places = || {
             rings
                 .iter()
@@ -136,7 +136,7 @@ pub(super) fn on_surface_around(
 }
 
 /// Places of the mesh on rings around the flag, at each the outermost along the normal.
-fn rings(mesh: &TriMesh, pose_of: &Isometry3<f64>, [radius, step]: [f64; 2]) -> Vec<Ring> {
+fn rings(mesh: &TriMesh, pose_of: &Isometry3<f64>, [radius, step]: [f64; 2]) -> Vec<OpeningRing> {
     let to_f = pose_of.inverse();
     let radii = (0..RINGS).map(|ring| radius + step * ring as f64);
     let directions = (0..DIRECTIONS).map(|at| at as f64 / DIRECTIONS as f64 * TAU);

@@ -7,12 +7,12 @@
 
 use nalgebra::UnitQuaternion;
 
-use super::cell::Cell;
-use super::cone::{NotReached, Orientation, leaned, rings};
+use super::cell::RobotCell;
+use super::cone::{NotReached, ShaftOrientation, leaned, rings};
 use super::ending::Ending;
 use super::links::Tool;
 use super::prober::Prober;
-use super::route::{FreeSpace, Route, ToolState};
+use super::route::{ArmFreeSpace, Route, ToolState};
 use touchup_features::calibrate::{SampleBlock, StaticPose};
 use touchup_method::stylus::Sample;
 
@@ -69,14 +69,14 @@ impl Prober<'_> {
         let home = ToolState::of(self.cell, &state);
         // the whole probe up to the flange keeps clear
         let length = self.cell.pose_ft.translation.vector.norm();
-        let cell = Cell {
+        let cell = RobotCell {
             tool: Tool {
                 shaft_length: length,
                 ..self.cell.tool
             },
             ..self.cell.clone()
         };
-        let space = FreeSpace {
+        let space = ArmFreeSpace {
             cell: &cell,
             ..self.space()
         };
@@ -158,7 +158,7 @@ impl Prober<'_> {
 
 /// Paths from one orientation to the next, orientations without a path, and the end of the last
 /// path.
-fn routes(space: &FreeSpace, home: &ToolState) -> (Vec<Route>, Vec<NotReached>, ToolState) {
+fn routes(space: &ArmFreeSpace, home: &ToolState) -> (Vec<Route>, Vec<NotReached>, ToolState) {
     let (mut routes, mut not_reached, mut at) = (Vec::new(), Vec::new(), *home);
     for orientation in orientations() {
         let rotation = leaned(&home.rotation, &orientation);
@@ -181,7 +181,7 @@ fn routes(space: &FreeSpace, home: &ToolState) -> (Vec<Route>, Vec<NotReached>, 
     (routes, not_reached, at)
 }
 
-fn orientations() -> impl Iterator<Item = Orientation> {
+fn orientations() -> impl Iterator<Item = ShaftOrientation> {
     rings(RINGS)
 }
 

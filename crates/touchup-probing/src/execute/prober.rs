@@ -4,17 +4,19 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Point3, UnitQuaternion};
 
-use super::cell::Cell;
+use super::cell::RobotCell;
 use super::ending::Ending;
 use super::links::{Clearance, LinkError, Tool};
 use super::opening_surface::on_surface_around;
 use super::reference::References;
-use super::route::FreeSpace;
+use super::route::ArmFreeSpace;
 use super::way_out::WayOut;
 use super::world::{World, distance, normal_about, on_mesh};
-use crate::arm::{Arm, ArmState, LimitError, Limits, Narrower, ProbeError, TouchParams, Watched};
+use crate::arm::{
+    Arm, ArmState, LimitError, Limits, ProbeError, RequestLimits, SupervisedArm, TouchParams,
+};
 use crate::plan::{DecisionGoal, ExploreError, Explorer, PatternParams};
-use touchup_features::features::Kind;
+use touchup_features::features::FeatureKind;
 
 /// A place to probe.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,7 +24,7 @@ pub struct Flag {
     /// number of the flag
     pub id: u32,
     /// kind of the feature; `None`: unknown
-    pub kind: Option<Kind>,
+    pub kind: Option<FeatureKind>,
     /// place of the flag, m in O
     pub place: Point3<f64>,
     /// maximum distance of the feature from the place, m
@@ -57,7 +59,7 @@ impl ProbeParams {
     ///
     /// # Errors
     /// As [`Limits::narrowed`]; [`LimitError::TooSoft`].
-    pub fn narrowed(&self, by: &Narrower) -> Result<Self, LimitError> {
+    pub fn narrowed(&self, by: &RequestLimits) -> Result<Self, LimitError> {
         let limits = self.limits.narrowed(by)?;
         let mut touch = self.touch;
         touch.force = touch.force.min(limits.force / HEADROOM);
@@ -84,7 +86,7 @@ impl Flag {
     /// [`ExploreError`] without a pattern for the flag.
     pub(super) fn explorer(
         &self,
-        cell: &Cell,
+        cell: &RobotCell,
         params: &ProbeParams,
         world: &dyn World,
         now: &ArmState,
@@ -96,7 +98,7 @@ impl Flag {
         let nearest = on_mesh(world, &self.place);
         let normal = normal_about(world, &nearest, &cell.shaft(&now.pose_bt.rotation));
         let (place, normal) = match self.kind {
-            Some(Kind::Hole | Kind::Slot | Kind::Pocket) => {
+            Some(FeatureKind::Hole | FeatureKind::Slot | FeatureKind::Pocket) => {
                 let ball = pattern.ball_radius;
                 on_surface_around(
                     world.mesh(),
@@ -119,7 +121,7 @@ impl Flag {
 /// Probes features with an arm.
 pub struct Prober<'a> {
     pub(super) arm: &'a mut dyn Arm,
-    pub(super) cell: &'a Cell,
+    pub(super) cell: &'a RobotCell,
     pub(super) params: &'a ProbeParams,
     pub(super) world: &'a mut dyn World,
     pub(super) way_out: Option<WayOut>,
@@ -130,7 +132,7 @@ impl<'a> Prober<'a> {
     /// - `arm`: at rest in free air, or at the beginning of [`Self::leaving_by`].
     pub fn new(
         arm: &'a mut dyn Arm,
-        cell: &'a Cell,
+        cell: &'a RobotCell,
         params: &'a ProbeParams,
         world: &'a mut dyn World,
     ) -> Self {
@@ -169,13 +171,13 @@ impl<'a> Prober<'a> {
     }
 
     /// The arm under all supervision.
-    pub(super) fn watched(&mut self) -> Watched<'_> {
-        Watched::new(self.arm, self.params.limits.clone(), self.world)
+    pub(super) fn watched(&mut self) -> SupervisedArm<'_> {
+        SupervisedArm::new(self.arm, self.params.limits.clone(), self.world)
     }
 
     /// Free space of the arm.
-    pub(super) fn space(&self) -> FreeSpace<'_> {
-        FreeSpace {
+    pub(super) fn space(&self) -> ArmFreeSpace<'_> {
+        ArmFreeSpace {
             cell: self.cell,
             limits: &self.params.limits,
             world: &*self.world,

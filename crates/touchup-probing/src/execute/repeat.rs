@@ -8,7 +8,7 @@ use super::prober::{Flag, Prober};
 use super::world::{normal_about, on_mesh};
 use crate::arm::{Onset, OnsetVerdict, TouchOutcome};
 use crate::plan::TouchPlan;
-use touchup_features::features::Kind;
+use touchup_features::features::FeatureKind;
 use touchup_geometry::numeric::tangent_basis;
 
 /// One touch of the spot.
@@ -115,7 +115,7 @@ impl Prober<'_> {
     ) -> Result<T, SpotError> {
         let flag = Flag {
             id: 0,
-            kind: Some(Kind::Plane),
+            kind: Some(FeatureKind::Plane),
             place: *spot,
             radius: ASIDE,
         };

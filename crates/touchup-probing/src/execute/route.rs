@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, UnitQuaternion};
 
-use super::cell::Cell;
+use super::cell::RobotCell;
 use super::ending::Ending;
 use super::links::Clearance;
 use super::world::{World, distance, highest};
@@ -22,7 +22,7 @@ pub(super) struct ToolState {
 }
 
 impl ToolState {
-    pub fn of(cell: &Cell, state: &ArmState) -> Self {
+    pub fn of(cell: &RobotCell, state: &ArmState) -> Self {
         Self {
             place: cell.place(&state.pose_bt),
             rotation: state.pose_bt.rotation,
@@ -59,13 +59,13 @@ const PART_GAP: f64 = 10e-3;
 
 /// Free space of an arm: a cell, within limits, around the mesh.
 #[derive(Clone, Copy)]
-pub(super) struct FreeSpace<'a> {
-    pub cell: &'a Cell,
+pub(super) struct ArmFreeSpace<'a> {
+    pub cell: &'a RobotCell,
     pub limits: &'a Limits,
     pub world: &'a dyn World,
 }
 
-impl FreeSpace<'_> {
+impl ArmFreeSpace<'_> {
     /// Checks a place of the ball; returns joints for it.
     ///
     /// # Errors
@@ -76,7 +76,7 @@ impl FreeSpace<'_> {
         at: &Point3<f64>,
         near: &Joints,
     ) -> Result<Joints, LimitError> {
-        let Cell {
+        let RobotCell {
             geometry, pose_ft, ..
         } = self.cell;
         let pose_bt = self.cell.pose(rotation, at);
@@ -265,11 +265,11 @@ mod tests {
     use touchup_geometry::mesh::TriMesh;
 
     /// A UR5e with its base in the frame of the part, its probe down.
-    fn cell() -> Cell {
+    fn cell() -> RobotCell {
         let down =
             UnitQuaternion::from_axis_angle(&nalgebra::Vector3::x_axis(), std::f64::consts::PI);
         let pose_ft = Isometry3::from_parts(nalgebra::Vector3::new(0.0, 0.0, 0.15).into(), down);
-        Cell {
+        RobotCell {
             geometry: UrGeometry::UR5E.into(),
             pose_bo: Isometry3::identity(),
             pose_ft,
@@ -296,7 +296,7 @@ mod tests {
 
     const FAR: [f64; 3] = [0.0, 0.0, -0.9];
 
-    fn joints_at(space: &FreeSpace<'_>, place: &Point3<f64>) -> Joints {
+    fn joints_at(space: &ArmFreeSpace<'_>, place: &Point3<f64>) -> Joints {
         space
             .cell
             .at_rest(&space.cell.pose(&UnitQuaternion::identity(), place))
@@ -310,7 +310,7 @@ mod tests {
     fn a_straight_way_through_the_base_is_refused_though_both_its_ends_are_reached() {
         let (cell, limits, world, upright) =
             (cell(), wide(), world(FAR), UnitQuaternion::identity());
-        let space = FreeSpace {
+        let space = ArmFreeSpace {
             cell: &cell,
             limits: &limits,
             world: &world,
@@ -343,7 +343,7 @@ mod tests {
         let place = Point3::new(-0.4, -0.1, 0.1);
         let free = world(FAR);
         let joints = joints_at(
-            &FreeSpace {
+            &ArmFreeSpace {
                 cell: &cell,
                 limits: &limits,
                 world: &free,
@@ -359,7 +359,7 @@ mod tests {
         // a corner of the part 50 mm above the axis of the forearm at its elbow: inside of its
         // radius of 58 mm
         let at_elbow = world([elbow.x, elbow.y, elbow.z + 50e-3]);
-        let space = FreeSpace {
+        let space = ArmFreeSpace {
             cell: &cell,
             limits: &limits,
             world: &at_elbow,
@@ -380,7 +380,7 @@ mod tests {
             arm_highest: Some(Point3::new(1.0, 1.0, elbow.z)),
             ..wide()
         };
-        let space = FreeSpace {
+        let space = ArmFreeSpace {
             cell: &cell,
             limits: &boxed,
             world: &free,
@@ -395,7 +395,7 @@ mod tests {
             ..wide()
         };
         assert!(
-            FreeSpace {
+            ArmFreeSpace {
                 limits: &roomy,
                 ..space
             }
@@ -409,7 +409,7 @@ mod tests {
     fn joints_stay_on_the_turn_that_they_have_made() {
         let (cell, limits, world, upright) =
             (cell(), wide(), world(FAR), UnitQuaternion::identity());
-        let space = FreeSpace {
+        let space = ArmFreeSpace {
             cell: &cell,
             limits: &limits,
             world: &world,
@@ -439,7 +439,7 @@ mod tests {
             ends in proptest::array::uniform2((-0.7..0.7f64, -0.7..0.7f64, 0.0..0.4f64))
         ) {
             let (cell, limits, world, upright) = (cell(), wide(), world(FAR), UnitQuaternion::identity());
-            let space = FreeSpace { cell: &cell, limits: &limits, world: &world };
+            let space = ArmFreeSpace { cell: &cell, limits: &limits, world: &world };
             let [from, to] = ends.map(|(x, y, z)| Point3::new(x, y, z));
             let Some(rest) = cell.at_rest(&cell.pose(&upright, &from)) else { return Ok(()) };
             prop_assume!(space.check(&upright, &from, &rest.joints).is_ok());

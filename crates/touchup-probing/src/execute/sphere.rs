@@ -7,7 +7,7 @@
 
 use nalgebra::{Point3, Unit, UnitQuaternion, Vector3};
 
-use super::cone::{NotReached, Orientation, leaned, rings};
+use super::cone::{NotReached, ShaftOrientation, leaned, rings};
 use super::ending::Ending;
 use super::feature_probing::FeatureProbing;
 use super::prober::Prober;
@@ -21,7 +21,7 @@ use touchup_geometry::numeric::tangent_basis;
 #[derive(Clone, Debug, PartialEq)]
 pub struct SphereOrientation {
     /// of the shaft, against its first one
-    pub orientation: Orientation,
+    pub orientation: ShaftOrientation,
     /// centres of the ball at contact, m in O
     pub centres: Vec<Point3<f64>>,
 }

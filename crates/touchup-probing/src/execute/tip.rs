@@ -3,7 +3,7 @@
 
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 
-use super::cone::{NotReached, Orientation, leaned, rings};
+use super::cone::{NotReached, ShaftOrientation, leaned, rings};
 use super::ending::Ending;
 use super::prober::Prober;
 use super::repeat::SpotError;
@@ -50,7 +50,7 @@ impl Prober<'_> {
             let [u, v] = tangent_basis(&normal).map(|across| across * ASIDE);
             let around = [u, v, -u, -v].map(|aside| {
                 (
-                    Orientation {
+                    ShaftOrientation {
                         lean: 0.0,
                         towards: 0.0,
                     },

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Point3};
 
-use super::cell::Cell;
+use super::cell::RobotCell;
 use super::route::ToolState;
 use crate::arm::ArmState;
 
@@ -41,7 +41,7 @@ impl WayOut {
     }
 
     /// State of the arm at the end of the path.
-    pub(super) fn end(&self, cell: &Cell, now: &ArmState) -> ArmState {
+    pub(super) fn end(&self, cell: &RobotCell, now: &ArmState) -> ArmState {
         ArmState {
             pose_bt: cell.pose(&self.out.rotation, &self.out.place),
             joints: self.out.joints,

@@ -2,11 +2,11 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::design::{Asked, Candidate, Knowledge};
+use super::design::{Candidate, Knowledge, TargetUncertainties};
 use super::kinds::slot::around_stadium;
 use super::search_context::toward;
-use touchup_features::features::fit::{Freedom, Surface};
-use touchup_features::features::{Feature, Kind, Walls};
+use touchup_features::features::fit::{Freedom, SurfaceModel};
+use touchup_features::features::{Feature, FeatureKind, Walls};
 use touchup_method::stylus::ProbedPoint;
 
 /// A place worth a touch.
@@ -39,7 +39,7 @@ const ENOUGH: f64 = 10e-6;
 /// - `touches`: all touches; the feature names its own by their numbers.
 pub fn advise_next_touch(feature: &Feature, touches: &[ProbedPoint]) -> Option<NextTouch> {
     let axis = feature.axis.as_ref()?.value;
-    let place = Asked::default().each(&[Freedom::X, Freedom::Y], ENOUGH);
+    let place = TargetUncertainties::default().each(&[Freedom::X, Freedom::Y], ENOUGH);
     match feature.walls.as_ref()? {
         Walls::Round(wall) => {
             let asked = place.and(&[(Freedom::Size, 2.0)], 2.0 * ENOUGH);
@@ -65,19 +65,19 @@ pub fn advise_next_touch(feature: &Feature, touches: &[ProbedPoint]) -> Option<N
 }
 
 /// - `places`: in the plane of the walls' frame, with the direction out of their middle; m.
-fn best<M: Surface>(
+fn best<M: SurfaceModel>(
     feature: &Feature,
     touches: &[ProbedPoint],
     surface: &M,
     axis: &Vector3<f64>,
     places: Vec<(Vector3<f64>, Vector3<f64>)>,
     radius: f64,
-    asked: &Asked,
+    asked: &TargetUncertainties,
 ) -> Option<NextTouch> {
     let pose_of = surface.pose_of();
     let (up, sign) = match feature.kind {
         // a boss rises from its foot, and out of its middle is out of the part
-        Kind::Boss => (*axis, 1.0),
+        FeatureKind::Boss => (*axis, 1.0),
         _ => (-axis, -1.0),
     };
     let depth = feature
@@ -134,7 +134,7 @@ mod tests {
     use std::f64::consts::{PI, TAU};
 
     use super::*;
-    use touchup_features::features::Measured;
+    use touchup_features::features::MeasuredValue;
     use touchup_features::features::fit::Cylinder;
 
     /// A hole Ø 8 at the origin, 10 deep, out of its opening along z; and touches of its wall.
@@ -164,10 +164,10 @@ mod tests {
         let wall = Cylinder::new(Point3::new(0.0, 0.0, -3e-3), &Vector3::z(), 4e-3, true);
         let numbers = (0..touches.len() as u32).collect();
         let feature = Feature {
-            kind: Kind::Hole,
-            axis: Some(Measured::new(Vector3::z(), None, Vec::new())),
-            diameter: Some(Measured::new(2.0 * wall.radius, Some(1e-5), numbers)),
-            depth: Some(Measured::new(10e-3, None, Vec::new())),
+            kind: FeatureKind::Hole,
+            axis: Some(MeasuredValue::new(Vector3::z(), None, Vec::new())),
+            diameter: Some(MeasuredValue::new(2.0 * wall.radius, Some(1e-5), numbers)),
+            depth: Some(MeasuredValue::new(10e-3, None, Vec::new())),
             walls: Some(Walls::Round(wall)),
             ..Feature::default()
         };

@@ -9,7 +9,7 @@
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
-use touchup_features::features::{Feature, Kind, Measured};
+use touchup_features::features::{Feature, FeatureKind, MeasuredValue};
 use touchup_method::parameters;
 
 parameters! {
@@ -58,13 +58,18 @@ impl ArmUncertainty {
     /// Standard uncertainty of a feature's place in its most uncertain direction, m.
     ///
     /// - `out`: of the surface, unit vector.
-    pub(super) fn position(&self, kind: Kind, place: &Point3<f64>, out: &Vector3<f64>) -> f64 {
+    pub(super) fn position(
+        &self,
+        kind: FeatureKind,
+        place: &Point3<f64>,
+        out: &Vector3<f64>,
+    ) -> f64 {
         let shift = self.shift(place);
         let largest = shift.symmetric_eigenvalues().max().max(0.0).sqrt();
         match kind {
-            Kind::Plane => along(&shift, out).hypot(self.radius),
+            FeatureKind::Plane => along(&shift, out).hypot(self.radius),
             // each face is one number
-            Kind::Edge => largest.hypot(self.radius),
+            FeatureKind::Edge => largest.hypot(self.radius),
             _ => largest,
         }
     }
@@ -77,9 +82,9 @@ impl ArmUncertainty {
                 .max(0.0)
                 .sqrt();
             let place = match feature.kind {
-                Kind::Plane => along(&shift, &axis).hypot(radius),
+                FeatureKind::Plane => along(&shift, &axis).hypot(radius),
                 // perpendicular faces; both move outward with the radius
-                Kind::Edge => across.hypot(std::f64::consts::SQRT_2 * radius),
+                FeatureKind::Edge => across.hypot(std::f64::consts::SQRT_2 * radius),
                 _ => across,
             };
             widen(&mut feature.centre, place);
@@ -93,7 +98,7 @@ impl ArmUncertainty {
         let length = feature
             .length
             .as_mut()
-            .filter(|_| feature.kind == Kind::Slot);
+            .filter(|_| feature.kind == FeatureKind::Slot);
         [feature.diameter.as_mut(), feature.width.as_mut(), length]
             .into_iter()
             .flatten()
@@ -108,7 +113,7 @@ fn along(covariance: &Matrix3<f64>, direction: &Vector3<f64>) -> f64 {
 }
 
 /// An undetermined number stays so.
-fn widen<T>(measured: &mut Measured<T>, by: f64) {
+fn widen<T>(measured: &mut MeasuredValue<T>, by: f64) {
     measured.std = measured.std.map(|std| std.hypot(by));
 }
 
@@ -126,16 +131,16 @@ mod tests {
             turn: 4e-3,
             ..ArmUncertainty::default()
         };
-        let number = |std| Some(Measured::new(8e-3, Some(std), Vec::new()));
+        let number = |std| Some(MeasuredValue::new(8e-3, Some(std), Vec::new()));
         let hole = Feature {
-            kind: Kind::Hole,
-            centre: Measured {
+            kind: FeatureKind::Hole,
+            centre: MeasuredValue {
                 value: Point3::new(30e-3, 0.0, 0.0),
                 std: Some(10e-6),
                 touches: Vec::new(),
-                ..Measured::default()
+                ..MeasuredValue::default()
             },
-            axis: Some(Measured::new(Vector3::z(), Some(1e-3), Vec::new())),
+            axis: Some(MeasuredValue::new(Vector3::z(), Some(1e-3), Vec::new())),
             diameter: number(20e-6),
             depth: number(7e-6),
             ..Feature::default()

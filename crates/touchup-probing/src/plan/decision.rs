@@ -13,7 +13,7 @@ use touchup_features::conformity::{
     Assessment, Decision, DecisionParams, MeasuredNumber, ToleranceLimits, assess, measured_number,
     repeated_confidence,
 };
-use touchup_features::features::{Feature, InspectedQuantity, Kind};
+use touchup_features::features::{Feature, FeatureKind, InspectedQuantity};
 use touchup_geometry::numeric::normal_quantile;
 
 /// A characteristic to decide.
@@ -67,13 +67,19 @@ const FEWEST: usize = 6;
 
 impl DecisionGoal {
     /// Whether touches exist for a quantity of a kind.
-    pub fn decides(kind: Kind, quantity: InspectedQuantity) -> bool {
+    pub fn decides(kind: FeatureKind, quantity: InspectedQuantity) -> bool {
         use InspectedQuantity::{Diameter, Length, Position, Width, X, Y, Z};
         match quantity {
-            X | Y | Z => !matches!(kind, Kind::Corner | Kind::Cylinder | Kind::Notch),
-            Position => matches!(kind, Kind::Hole | Kind::Slot | Kind::Pocket | Kind::Boss),
-            Diameter => matches!(kind, Kind::Hole | Kind::Boss),
-            Width | Length => matches!(kind, Kind::Slot | Kind::Pocket),
+            X | Y | Z => !matches!(
+                kind,
+                FeatureKind::Corner | FeatureKind::Cylinder | FeatureKind::Notch
+            ),
+            Position => matches!(
+                kind,
+                FeatureKind::Hole | FeatureKind::Slot | FeatureKind::Pocket | FeatureKind::Boss
+            ),
+            Diameter => matches!(kind, FeatureKind::Hole | FeatureKind::Boss),
+            Width | Length => matches!(kind, FeatureKind::Slot | FeatureKind::Pocket),
             _ => false,
         }
     }

@@ -7,7 +7,7 @@
 
 use nalgebra::{Point3, SMatrix};
 
-use touchup_features::features::fit::{FREEDOMS, Fit, Freedom, Steps, Surface};
+use touchup_features::features::fit::{FREEDOMS, Fit, Freedom, Steps, SurfaceModel};
 
 type InformationMatrix = SMatrix<f64, FREEDOMS, FREEDOMS>;
 
@@ -20,9 +20,9 @@ pub struct Candidate {
     pub sigma: f64,
 }
 
-/// The requested numbers of a surface.
+/// Requested standard deviations of the numbers of a surface.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Asked {
+pub struct TargetUncertainties {
     /// Derivatives of each number by the freedoms, over its requested deviation.
     by: Vec<Steps>,
     /// the same for other numbers, which must not stay undetermined
@@ -32,7 +32,7 @@ pub struct Asked {
 /// Allowed deviation of such a number, over the requested deviation.
 const REST: f64 = 8.0;
 
-impl Asked {
+impl TargetUncertainties {
     /// Adds a number with a requested standard deviation of `sigma` (m or rad).
     pub fn and(mut self, by: &[(Freedom, f64)], sigma: f64) -> Self {
         let mut steps = Steps::zeros();
@@ -50,7 +50,7 @@ impl Asked {
     }
 
     /// Whether a fit fixes all requested numbers.
-    pub(super) fn is_fixed_by<M: Surface>(&self, fit: &Fit<M>) -> bool {
+    pub(super) fn is_fixed_by<M: SurfaceModel>(&self, fit: &Fit<M>) -> bool {
         self.by.iter().all(|by| fit.std_of(by).is_some())
     }
 
@@ -58,7 +58,7 @@ impl Asked {
     /// with another number open goes astray by its curvature.
     ///
     /// - `sigma`: requested of the numbers, m; `size`: of the surface, m, as the lever of a lean.
-    pub fn and_the_rest<M: Surface>(mut self, sigma: f64, size: f64) -> Self {
+    pub fn and_the_rest<M: SurfaceModel>(mut self, sigma: f64, size: f64) -> Self {
         for freedom in Freedom::ALL
             .into_iter()
             .filter(|freedom| M::FREE[*freedom as usize])
@@ -81,7 +81,7 @@ pub struct Knowledge {
 impl Knowledge {
     /// Before any touch: standard deviations of `length` (m) or `angle` (rad) for each freedom of
     /// the surface.
-    pub fn before<M: Surface>(length: f64, angle: f64) -> Self {
+    pub fn before<M: SurfaceModel>(length: f64, angle: f64) -> Self {
         let sigma = Freedom::ALL.map(|freedom| match freedom {
             _ if !M::FREE[freedom as usize] => 0.0,
             Freedom::TiltX | Freedom::TiltY | Freedom::Turn => angle,
@@ -96,7 +96,7 @@ impl Knowledge {
     }
 
     /// After one more touch of the surface.
-    pub fn with<M: Surface>(&self, surface: &M, touch: &Candidate) -> Self {
+    pub fn with<M: SurfaceModel>(&self, surface: &M, touch: &Candidate) -> Self {
         let (_, g) = surface.derivatives(&touch.point);
         let cg = self.covariance * g;
         let covariance = self.covariance - cg * cg.transpose() / (touch.sigma.powi(2) + g.dot(&cg));
@@ -107,13 +107,13 @@ impl Knowledge {
     }
 
     /// Standard deviation of the surface along its normal at a place of it, m.
-    pub(crate) fn sigma_at<M: Surface>(&self, surface: &M, point: &Point3<f64>) -> f64 {
+    pub(crate) fn sigma_at<M: SurfaceModel>(&self, surface: &M, point: &Point3<f64>) -> f64 {
         let (_, g) = surface.derivatives(point);
         g.dot(&(self.covariance * g)).max(0.0).sqrt()
     }
 
     /// Largest deviation over its request; at most 1 if all requests are met.
-    pub fn worst(&self, asked: &Asked) -> f64 {
+    pub fn worst(&self, asked: &TargetUncertainties) -> f64 {
         let shares = asked
             .by
             .iter()
@@ -123,7 +123,12 @@ impl Knowledge {
 
     /// Reduction by a touch of the sum over the requested numbers of (deviation / requested
     /// deviation)².
-    pub fn gain<M: Surface>(&self, surface: &M, touch: &Candidate, asked: &Asked) -> f64 {
+    pub fn gain<M: SurfaceModel>(
+        &self,
+        surface: &M,
+        touch: &Candidate,
+        asked: &TargetUncertainties,
+    ) -> f64 {
         let (_, g) = surface.derivatives(&touch.point);
         let cg = self.covariance * g;
         let reduction: f64 = asked
@@ -139,12 +144,12 @@ impl Knowledge {
     /// gain.
     ///
     /// - `touch`: of a candidate.
-    pub fn best<M: Surface, T>(
+    pub fn best<M: SurfaceModel, T>(
         &self,
         surface: &M,
         candidates: impl IntoIterator<Item = T>,
         touch: impl Fn(&T) -> Candidate,
-        asked: &Asked,
+        asked: &TargetUncertainties,
     ) -> Option<(T, f64)> {
         let gain = |candidate: &T| self.gain(surface, &touch(candidate), asked);
         let gains = candidates

@@ -14,19 +14,19 @@ use super::kinds::region;
 use super::kinds::slot;
 use super::level::UNTOUCHED;
 use super::outline::Outline;
-use super::pattern::{Stage, Touched};
+use super::pattern::{PatternStep, TouchPattern};
 use super::search::{DEEPEST, ROUGH};
 use super::search_context::{PatternParams, SearchContext, TouchPlan, TouchResult};
 use super::slide::Slide;
 use touchup_features::conformity::{Decision, DecisionParams};
 use touchup_features::features::fit::Observation;
-use touchup_features::features::{Feature, Kind};
+use touchup_features::features::{Feature, FeatureKind};
 use touchup_geometry::mesh::TriMesh;
 use touchup_geometry::numeric::turned_to;
 
 /// Result of an exploration.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Found {
+pub struct ExplorationResult {
     /// the feature; `None` for an unknown region, which only the mesh describes
     pub feature: Option<Feature>,
     /// number of touches, misses included
@@ -52,10 +52,10 @@ pub struct Found {
 #[derive(Debug)]
 pub struct Explorer {
     context: SearchContext,
-    stage: Box<dyn Stage>,
+    stage: Box<dyn TouchPattern>,
     asked: Option<TouchPlan>,
     ended: Option<Result<bool, ExploreError>>,
-    kind: Option<Kind>,
+    kind: Option<FeatureKind>,
     /// requested uncertainty of the number, m or rad
     wanted: f64,
     /// part common to all touches, m or rad
@@ -78,26 +78,28 @@ impl Explorer {
     /// # Errors
     /// [`ExploreError::NoPattern`], [`ExploreError::NoSuchNumber`].
     pub fn new(
-        kind: Option<Kind>,
+        kind: Option<FeatureKind>,
         flag: &Point3<f64>,
         normal: &Unit<Vector3<f64>>,
         params: PatternParams,
         scan: &TriMesh,
     ) -> Result<Self, ExploreError> {
         if !params.quantity.is_of(kind) {
-            let kind = kind.map_or("unknown region", Kind::name);
+            let kind = kind.map_or("unknown region", FeatureKind::name);
             return Err(ExploreError::NoSuchNumber {
                 kind,
                 number: params.quantity.name(),
             });
         }
-        let stage: Box<dyn Stage> = match kind {
-            Some(Kind::Hole) => Box::new(hole::HolePattern::new(&params)),
-            Some(Kind::Slot | Kind::Pocket) => Box::new(slot::SlotPattern::new(&params)),
-            Some(Kind::Boss) => Box::new(boss::BossPattern::new()),
-            Some(Kind::Edge) => Box::new(edge::EdgePattern::new()),
-            Some(Kind::Plane) => Box::new(plane::PlanePattern::new(&params)),
-            Some(kind @ (Kind::Corner | Kind::Cylinder | Kind::Notch)) => {
+        let stage: Box<dyn TouchPattern> = match kind {
+            Some(FeatureKind::Hole) => Box::new(hole::HolePattern::new(&params)),
+            Some(FeatureKind::Slot | FeatureKind::Pocket) => {
+                Box::new(slot::SlotPattern::new(&params))
+            }
+            Some(FeatureKind::Boss) => Box::new(boss::BossPattern::new()),
+            Some(FeatureKind::Edge) => Box::new(edge::EdgePattern::new()),
+            Some(FeatureKind::Plane) => Box::new(plane::PlanePattern::new(&params)),
+            Some(kind @ (FeatureKind::Corner | FeatureKind::Cylinder | FeatureKind::Notch)) => {
                 return Err(ExploreError::NoPattern { kind: kind.name() });
             }
             None => Box::new(region::RegionPattern::new(&params)),
@@ -140,7 +142,7 @@ impl Explorer {
     /// an uncertainty.
     pub fn until_decided(mut self, goal: DecisionGoal) -> Self {
         let of_one_look = goal.of_one_look(self.context.params.budget);
-        self.context.params.quantity = super::search_context::Quantity::All;
+        self.context.params.quantity = super::search_context::FeatureQuantity::All;
         self.goal = Some((goal, of_one_look));
         self
     }
@@ -232,7 +234,7 @@ impl Explorer {
         let (result, is_left_out) = (TouchResult::Nothing, true);
         self.stage.take(
             &mut self.context,
-            &Touched {
+            &PatternStep {
                 planned,
                 result,
                 is_left_out,
@@ -275,7 +277,7 @@ impl Explorer {
         let is_left_out = false;
         self.stage.take(
             &mut self.context,
-            &Touched {
+            &PatternStep {
                 planned,
                 result: *result,
                 is_left_out,
@@ -289,7 +291,7 @@ impl Explorer {
     ///
     /// # Errors
     /// [`ExploreError`].
-    pub fn found(&self) -> Result<Found, ExploreError> {
+    pub fn found(&self) -> Result<ExplorationResult, ExploreError> {
         let is_as_asked = match &self.ended {
             Some(Err(error)) => return Err(error.clone()),
             Some(Ok(is_as_asked)) => *is_as_asked,
@@ -314,7 +316,7 @@ impl Explorer {
         let by_touches = self.stage.feature(&self.context)?;
         let place = by_touches.as_ref().map(|feature| feature.centre.value);
         let (params, out) = (&self.context.params, self.context.out());
-        Ok(Found {
+        Ok(ExplorationResult {
             feature: by_touches
                 .clone()
                 .map(|feature| params.shared.widened(feature)),

@@ -2,16 +2,18 @@
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
-use super::design::{Asked, Candidate, Knowledge};
+use super::design::{Candidate, Knowledge, TargetUncertainties};
 use super::error::ExploreError;
-use super::pattern::Touched;
+use super::pattern::PatternStep;
 use super::search_context::{
-    Expected, PatternParams, Quantity, SearchContext, TouchPlan, TouchResult,
+    ExpectedTravel, FeatureQuantity, PatternParams, SearchContext, TouchPlan, TouchResult,
 };
-use touchup_features::features::fit::{Fit, FitParams, Freedom, Observation, Plane, Surface, fit};
+use touchup_features::features::fit::{
+    Fit, FitParams, Freedom, Observation, Plane, SurfaceModel, fit,
+};
 
 /// A candidate touch: its place on the surface, and its plan.
-pub(super) struct Possible {
+pub(super) struct CandidateTouch {
     /// place on the surface, m in O
     pub point: Point3<f64>,
     /// travel of the ball's centre from the start of the search, m
@@ -25,8 +27,11 @@ const BEHIND: f64 = 0.3e-3;
 impl SearchContext {
     /// Candidates for which the scan has a part: all around a touch from above, behind a touched
     /// wall.
-    pub fn on_part(&self, possible: impl IntoIterator<Item = Possible>) -> Vec<Possible> {
-        let is_part = |p: &Possible| {
+    pub fn on_part(
+        &self,
+        possible: impl IntoIterator<Item = CandidateTouch>,
+    ) -> Vec<CandidateTouch> {
+        let is_part = |p: &CandidateTouch| {
             let (behind, radius) = if self.is_down(&p.planned) {
                 (0.0, self.params.ball_radius)
             } else {
@@ -42,16 +47,16 @@ impl SearchContext {
 }
 
 /// Request for a surface, and prior of it before any touch.
-pub(super) struct Wanted {
+pub(super) struct SurfaceRequest {
     pub before: Knowledge,
-    pub asked: Asked,
+    pub asked: TargetUncertainties,
     pub fit: FitParams,
     /// minimum number of touches for a credible surface
     pub least: usize,
     pub params: PatternParams,
 }
 
-impl Wanted {
+impl SurfaceRequest {
     /// Request for a plane.
     ///
     /// - `leans`: leans that count, as far as `reach` from its middle, m; `most`: lean above which
@@ -63,10 +68,10 @@ impl Wanted {
         most: f64,
         least: usize,
     ) -> Self {
-        let (asked, sigma) = (Asked::default(), params.sigma);
+        let (asked, sigma) = (TargetUncertainties::default(), params.sigma);
         let asked = match params.quantity {
-            Quantity::Axis => asked.each(leans, sigma),
-            Quantity::Position => asked.each(&[Freedom::Z], sigma),
+            FeatureQuantity::Axis => asked.each(leans, sigma),
+            FeatureQuantity::Position => asked.each(&[Freedom::Z], sigma),
             _ => asked.each(&[Freedom::Z], sigma).each(leans, sigma / reach),
         };
         let (before, fit) = (
@@ -83,7 +88,7 @@ impl Wanted {
     }
 
     /// Covariance of a surface after its touches.
-    fn known<'a, M: Surface>(
+    fn known<'a, M: SurfaceModel>(
         &self,
         surface: &M,
         touches: impl Iterator<Item = &'a Observation>,
@@ -123,7 +128,7 @@ const DEAD: f64 = 0.2e-3;
 
 impl Measuring {
     /// Takes a touch that aimed at this surface.
-    pub fn take(&mut self, touch: &Touched) {
+    pub fn take(&mut self, touch: &PatternStep) {
         let aimed = self.aimed.take();
         match (touch.result, aimed) {
             (TouchResult::At { .. }, _) => self.observations.extend(touch.observation),
@@ -133,7 +138,7 @@ impl Measuring {
     }
 
     /// Refuses the last contact, which belongs to another surface.
-    pub fn refuse_last(&mut self, touch: &Touched) {
+    pub fn refuse_last(&mut self, touch: &PatternStep) {
         if self.observations.last() == touch.observation.as_ref()
             && self.observations.pop().is_some()
         {
@@ -147,7 +152,7 @@ impl Measuring {
     ///
     /// `None` for too few touches, for touches that do not fix a number, or for more than
     /// [`MOST_REFUSED`] of them off the surface.
-    pub fn uncertainty<M: Surface>(&self, guess: &M, wanted: &Wanted) -> Option<f64> {
+    pub fn uncertainty<M: SurfaceModel>(&self, guess: &M, wanted: &SurfaceRequest) -> Option<f64> {
         if self.observations.len() < wanted.least {
             return None;
         }
@@ -178,7 +183,7 @@ impl Measuring {
     ///
     /// # Errors
     /// [`ExploreError::TwoSurfaces`] if the contacts that it leaves out agree; as [`fit`].
-    pub fn fitted<M: Surface>(
+    pub fn fitted<M: SurfaceModel>(
         &self,
         guess: &M,
         params: &FitParams,
@@ -196,7 +201,7 @@ impl Measuring {
     }
 
     /// Error for contacts that a fit leaves out, if they are off its surface alike.
-    fn agreeing<M: Surface>(&self, fit: &Fit<M>) -> Option<ExploreError> {
+    fn agreeing<M: SurfaceModel>(&self, fit: &Fit<M>) -> Option<ExploreError> {
         let off: Vec<_> = self
             .observations
             .iter()
@@ -224,22 +229,23 @@ impl Measuring {
     }
 
     /// Touch with the largest gain for the requested numbers, and its gain.
-    pub fn best<M: Surface>(
+    pub fn best<M: SurfaceModel>(
         &self,
         surface: &M,
-        wanted: &Wanted,
-        possible: Vec<Possible>,
-    ) -> Option<(Possible, f64)> {
+        wanted: &SurfaceRequest,
+        possible: Vec<CandidateTouch>,
+    ) -> Option<(CandidateTouch, f64)> {
         let known = wanted.known(surface, self.observations.iter());
-        let is_alive = |p: &Possible| self.dead.iter().all(|dead| (dead - p.point).norm() > DEAD);
-        let candidate = |p: &Possible| Candidate {
+        let is_alive =
+            |p: &CandidateTouch| self.dead.iter().all(|dead| (dead - p.point).norm() > DEAD);
+        let candidate = |p: &CandidateTouch| Candidate {
             point: p.point,
             sigma: wanted.params.touch_sigma,
         };
         let possible = possible.into_iter().filter(is_alive);
         let (mut chosen, gain) = known.best(surface, possible, candidate, &wanted.asked)?;
         let sigma = known.sigma_at(surface, &chosen.point);
-        chosen.planned.expected = Some(Expected {
+        chosen.planned.expected = Some(ExpectedTravel {
             travel: chosen.travel,
             sigma,
         });
@@ -247,18 +253,18 @@ impl Measuring {
     }
 
     /// Plan of the touch with the largest gain.
-    pub fn next<M: Surface>(
+    pub fn next<M: SurfaceModel>(
         &mut self,
         surface: &M,
-        wanted: &Wanted,
-        possible: Vec<Possible>,
+        wanted: &SurfaceRequest,
+        possible: Vec<CandidateTouch>,
     ) -> Option<TouchPlan> {
         self.best(surface, wanted, possible)
             .map(|(best, _)| self.aim(&best))
     }
 
     /// Plans a touch of this surface.
-    pub fn aim(&mut self, possible: &Possible) -> TouchPlan {
+    pub fn aim(&mut self, possible: &CandidateTouch) -> TouchPlan {
         self.aimed = Some(possible.point);
         possible.planned
     }

@@ -12,7 +12,7 @@ use touchup_features::features::Feature;
 use touchup_features::features::fit::Observation;
 
 /// A touch and its result, as a stage takes them.
-pub(super) struct Touched {
+pub(super) struct PatternStep {
     pub planned: TouchPlan,
     pub result: TouchResult,
     /// whether the touch was left out, as the scan has no part there: then it counts as a miss
@@ -23,14 +23,14 @@ pub(super) struct Touched {
 }
 
 /// Exploration of one kind of feature.
-pub(super) trait Stage: Debug + Send {
+pub(super) trait TouchPattern: Debug + Send {
     /// Next planned touch; `None` if no touch can improve the feature.
     ///
     /// # Errors
     /// [`ExploreError`] if there is no such feature.
     fn next(&mut self, context: &mut SearchContext) -> Result<Option<TouchPlan>, ExploreError>;
     /// Takes the result of the touch.
-    fn take(&mut self, context: &mut SearchContext, touch: &Touched);
+    fn take(&mut self, context: &mut SearchContext, touch: &PatternStep);
     /// The feature by the touches made.
     ///
     /// # Errors

@@ -6,7 +6,7 @@
 use nalgebra::Point3;
 
 use super::error::ExploreError;
-use super::pattern::Touched;
+use super::pattern::PatternStep;
 use super::search_context::{PatternParams, SearchContext, TouchPlan, TouchResult};
 use touchup_features::features::fit::Observation;
 
@@ -142,7 +142,11 @@ impl OpeningSearch {
     }
 
     /// Takes a touch; returns its place if the ball fell in.
-    pub fn take(&mut self, context: &mut SearchContext, touch: &Touched) -> Option<Point3<f64>> {
+    pub fn take(
+        &mut self,
+        context: &mut SearchContext,
+        touch: &PatternStep,
+    ) -> Option<Point3<f64>> {
         let wanted = context.in_f(&touch.planned.from);
         let wanted = Point3::new(wanted.x, wanted.y, 0.0);
         match (touch.result, touch.place, touch.observation) {

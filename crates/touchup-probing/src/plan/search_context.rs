@@ -8,7 +8,7 @@ use nalgebra::{Isometry3, Point3, Unit, Vector3};
 use super::arm_uncertainty::ArmUncertainty;
 use super::outline::Outline;
 use touchup_features::features::fit::Observation;
-use touchup_features::features::{End, Kind};
+use touchup_features::features::{End, FeatureKind};
 use touchup_method::names;
 use touchup_method::parameters;
 
@@ -30,7 +30,7 @@ parameters! {
         /// In m.
         depth: f64 = 5.0, "depth_mm" [MM, 0, 100];
         /// Number that the touches serve.
-        quantity: Quantity = Quantity::All;
+        quantity: FeatureQuantity = FeatureQuantity::All;
         /// Requested standard deviation of this number, m, or rad of an axis.
         sigma: f64 = 4e-6;
         /// Touches of a feature at most.
@@ -57,7 +57,7 @@ parameters! {
 names! {
     /// A number of a feature.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-    pub enum Quantity {
+    pub enum FeatureQuantity {
         /// place and sizes: every length
         #[default]
         All = "every length",
@@ -74,14 +74,14 @@ names! {
     }
 }
 
-impl Quantity {
+impl FeatureQuantity {
     /// Whether a feature has it.
-    pub fn is_of(self, kind: Option<Kind>) -> bool {
+    pub fn is_of(self, kind: Option<FeatureKind>) -> bool {
         match self {
             Self::All => true,
             Self::Position | Self::Axis => kind.is_some(),
-            Self::Diameter => matches!(kind, Some(Kind::Hole | Kind::Boss)),
-            Self::Length | Self::Width => kind == Some(Kind::Slot),
+            Self::Diameter => matches!(kind, Some(FeatureKind::Hole | FeatureKind::Boss)),
+            Self::Length | Self::Width => kind == Some(FeatureKind::Slot),
         }
     }
 }
@@ -97,7 +97,7 @@ impl PatternParams {
     /// - `out`: of the surface, unit vector.
     pub(super) fn shared_part(
         &self,
-        kind: Option<Kind>,
+        kind: Option<FeatureKind>,
         place: &Point3<f64>,
         out: &Vector3<f64>,
     ) -> f64 {
@@ -107,10 +107,12 @@ impl PatternParams {
             2.0 * self.shared.radius,
         );
         match self.quantity {
-            Quantity::Axis => self.shared.turn,
-            Quantity::Diameter | Quantity::Width | Quantity::Length => size,
-            Quantity::All if !matches!(kind, Kind::Plane | Kind::Edge) => position.max(size),
-            Quantity::Position | Quantity::All => position,
+            FeatureQuantity::Axis => self.shared.turn,
+            FeatureQuantity::Diameter | FeatureQuantity::Width | FeatureQuantity::Length => size,
+            FeatureQuantity::All if !matches!(kind, FeatureKind::Plane | FeatureKind::Edge) => {
+                position.max(size)
+            }
+            FeatureQuantity::Position | FeatureQuantity::All => position,
         }
     }
 
@@ -134,7 +136,7 @@ pub struct TouchPlan {
     /// Length of the search, m.
     pub search: f64,
     /// Position of the surface, predicted from earlier touches.
-    pub expected: Option<Expected>,
+    pub expected: Option<ExpectedTravel>,
 }
 
 impl TouchPlan {
@@ -146,7 +148,7 @@ impl TouchPlan {
 
 /// Expected distance of the surface from the start of a search.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Expected {
+pub struct ExpectedTravel {
     /// travel of the ball's centre, m
     pub travel: f64,
     /// standard deviation of the travel, m

@@ -2,7 +2,7 @@
 
 /// A least-squares line through points.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Line {
+pub struct RegressionLine {
     /// y at x = 0
     pub offset: f64,
     /// y over x
@@ -14,7 +14,7 @@ pub struct Line {
 }
 
 /// The line through (x, y); `None` for fewer than two points, equal x, or non-finite values.
-pub fn straight_line(points: &[(f64, f64)]) -> Option<Line> {
+pub fn straight_line(points: &[(f64, f64)]) -> Option<RegressionLine> {
     let n = points.len() as f64;
     let (x, y) = points
         .iter()
@@ -29,7 +29,7 @@ pub fn straight_line(points: &[(f64, f64)]) -> Option<Line> {
         .sum();
     let there: f64 = points.iter().map(|p| (p.1 - y).powi(2)).sum();
     let r_squared = (there > 0.0).then(|| 1.0 - left / there);
-    Some(Line {
+    Some(RegressionLine {
         offset: y - slope * x,
         slope,
         left: (left / n).sqrt(),
@@ -41,9 +41,9 @@ pub fn straight_line(points: &[(f64, f64)]) -> Option<Line> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Decay {
     /// e ∝ exp(−rate · sweep) \[paper, Fig 11\], over the sweep: falls by the rate
-    pub exponential: Line,
+    pub exponential: RegressionLine,
     /// e ∝ sweep^−exponent, over the logarithm of the sweep: falls by the exponent
-    pub power: Line,
+    pub power: RegressionLine,
 }
 
 /// Fits both laws to the errors after sweep 1, 2, 3, …; `None` for fewer than two errors, or for an

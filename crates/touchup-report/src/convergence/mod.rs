@@ -7,14 +7,14 @@ mod one_face;
 mod sweeps;
 mod text;
 
-pub use decay::{Decay, Line, fit_decay, straight_line};
+pub use decay::{Decay, RegressionLine, fit_decay, straight_line};
 pub use errors::MeshErrors;
 pub use one_face::{OneFaceRun, OneFaceSample};
 pub(super) use sweeps::region_over;
 pub use sweeps::{BLOWN_UP, PaperSweeps, RobustSweeps, noisy, raster_samples};
 
 use super::Effort;
-use super::error::{MeasureError, Measured};
+use super::error::{MeasureError, MeasureResult};
 use touchup_method::names;
 use touchup_method::stylus::Sample;
 use touchup_sim::Peaks;
@@ -80,7 +80,7 @@ impl SweepRun {
         (rule, seed, edge): (Rule, u64, f64),
         start: MeshErrors,
         count: usize,
-        mut sweep: impl FnMut() -> Measured<MeshErrors>,
+        mut sweep: impl FnMut() -> MeasureResult<MeshErrors>,
     ) -> Self {
         let (mut errors, mut ended, mut has_blown_up) = (vec![start], None, false);
         for number in 1..=count {
@@ -158,7 +158,7 @@ pub fn convergence(effort: Effort, progress: &mut dyn FnMut(&str)) -> Convergenc
     }
 }
 
-fn paper_run(seed: u64, sweeps: usize) -> Measured<SweepRun> {
+fn paper_run(seed: u64, sweeps: usize) -> MeasureResult<SweepRun> {
     let mut run = PaperSweeps::new(PAPER_EDGE, None, seed)?;
     let start = run.errors();
     Ok(SweepRun::of(
@@ -169,7 +169,12 @@ fn paper_run(seed: u64, sweeps: usize) -> Measured<SweepRun> {
     ))
 }
 
-fn robust_run(peaks: &Peaks, samples: &[Sample], seed: u64, sweeps: usize) -> Measured<SweepRun> {
+fn robust_run(
+    peaks: &Peaks,
+    samples: &[Sample],
+    seed: u64,
+    sweeps: usize,
+) -> MeasureResult<SweepRun> {
     let mut run = RobustSweeps::new(peaks, noisy(&peaks.mesh(ROBUST_EDGE)?, seed), samples)?;
     Ok(SweepRun::of(
         (Rule::Robust, seed, ROBUST_EDGE),

@@ -3,7 +3,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use crate::error::Measured;
+use crate::error::MeasureResult;
 use touchup_method::haptic::{
     DynamicsParams, FaceDynamics, FaceState, RefineError, RefineParams, TipParams,
 };
@@ -49,7 +49,7 @@ const STARTS: [([f64; 3], f64, f64); 3] = [
 ///
 /// # Errors
 /// [`MeasureError`](crate::error::MeasureError) for a refused step.
-pub(super) fn one_face_runs(seconds: usize) -> Measured<Vec<OneFaceRun>> {
+pub(super) fn one_face_runs(seconds: usize) -> MeasureResult<Vec<OneFaceRun>> {
     STARTS
         .iter()
         .map(|&(b_mm, tilt_deg, azimuth_deg)| one_face(b_mm, tilt_deg, azimuth_deg, seconds))
@@ -61,7 +61,7 @@ fn one_face(
     tilt_deg: f64,
     azimuth_deg: f64,
     seconds: usize,
-) -> Measured<OneFaceRun> {
+) -> MeasureResult<OneFaceRun> {
     let params: DynamicsParams = RefineParams::paper(TipParams {
         radius: 0.0,
         stiffness: None,

@@ -4,14 +4,14 @@
 use nalgebra::{Isometry3, Point2, Point3, Vector3};
 
 use super::errors::MeshErrors;
-use crate::error::Measured;
+use crate::error::MeasureResult;
 use touchup_geometry::mesh::TriMesh;
 use touchup_method::haptic::{GuardParams, RefineParams, Refiner, StepRule, TipParams};
 use touchup_method::stylus::{Sample, Wrench};
 use touchup_sim::coupled::GuidedStylus;
 use touchup_sim::{
-    Lines, Moment, PathParams, Peaks, RasterRegion, SensorParams, StylusParams, Surface,
-    add_vertex_noise, raster, touch,
+    PathParams, Peaks, RasterDirection, RasterRegion, SensorParams, StylusParams, Surface,
+    TrueState, add_vertex_noise, raster, touch,
 };
 
 /// Sample period of the paper, ns and s.
@@ -49,7 +49,7 @@ impl PaperSweeps {
     ///
     /// # Errors
     /// [`MeasureError`](crate::error::MeasureError) for an invalid edge.
-    pub fn new(edge: f64, guard: Option<GuardParams>, seed: u64) -> Measured<Self> {
+    pub fn new(edge: f64, guard: Option<GuardParams>, seed: u64) -> MeasureResult<Self> {
         let truth = Peaks::default().mesh(edge)?;
         // ten million samples: a joint solution takes twenty times as long
         let mut params = RefineParams {
@@ -76,7 +76,7 @@ impl PaperSweeps {
     ///
     /// # Errors
     /// [`MeasureError::Refine`](crate::error::MeasureError::Refine) for a refused step.
-    pub fn sweep(&mut self, start_mm: f64) -> Measured<MeshErrors> {
+    pub fn sweep(&mut self, start_mm: f64) -> MeasureResult<MeshErrors> {
         let faces: Vec<_> = self.truth.faces().map(|(face, _)| face).collect();
         let (model, stylus) = (self.params.dynamics.model, GuidedStylus::default());
         for face in faces {
@@ -131,13 +131,13 @@ pub(crate) fn region_over(peaks: &Peaks, half: f64, radius: f64) -> RasterRegion
 ///
 /// # Errors
 /// [`MeasureError::Sim`](crate::error::MeasureError::Sim) for an invalid friction.
-pub fn raster_samples(peaks: &Peaks, friction: f64) -> Measured<Vec<Sample>> {
+pub fn raster_samples(peaks: &Peaks, friction: f64) -> MeasureResult<Vec<Sample>> {
     let TipParams { radius, stiffness } = TIP;
     let stiffness = stiffness.unwrap_or(f64::INFINITY);
     let region = region_over(peaks, 0.5 * 50e-3, radius);
     let path = raster(
         &region,
-        Lines::AlongX,
+        RasterDirection::AlongX,
         &PathParams {
             radius,
             ..PathParams::default()
@@ -154,7 +154,7 @@ pub fn raster_samples(peaks: &Peaks, friction: f64) -> Measured<Vec<Sample>> {
         ..StylusParams::default()
     };
     let moments = touch(peaks, &path, &stylus, 1)?.moments;
-    let sample = |(i, moment): (usize, &Moment)| {
+    let sample = |(i, moment): (usize, &TrueState)| {
         let mut pose_ot = moment.pose_ot;
         pose_ot.translation.vector -= moment.force_o / stiffness;
         let force = moment.pose_ot.rotation.inverse() * moment.force_o;
@@ -185,7 +185,7 @@ impl<'a> RobustSweeps<'a> {
     ///
     /// # Errors
     /// [`MeasureError::Refine`](crate::error::MeasureError::Refine) for a scan without faces.
-    pub fn new(peaks: &'a Peaks, scan: TriMesh, samples: &'a [Sample]) -> Measured<Self> {
+    pub fn new(peaks: &'a Peaks, scan: TriMesh, samples: &'a [Sample]) -> MeasureResult<Self> {
         let params = RefineParams {
             scan_noise: 3e-3,
             ..RefineParams::robust(TIP)
@@ -202,7 +202,7 @@ impl<'a> RobustSweeps<'a> {
     ///
     /// # Errors
     /// [`MeasureError::Refine`](crate::error::MeasureError::Refine) for a refused sample.
-    pub fn sweep(&mut self) -> Measured<MeshErrors> {
+    pub fn sweep(&mut self) -> MeasureResult<MeshErrors> {
         let start_ns = self.last_ns;
         for sample in self.samples {
             self.last_ns = start_ns + sample.stamp_ns;

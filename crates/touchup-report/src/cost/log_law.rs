@@ -1,6 +1,6 @@
 //! Growth of a push's time with the logarithm of the scan: t = a + b ln F.
 
-use crate::convergence::{Line, straight_line};
+use crate::convergence::{RegressionLine, straight_line};
 
 /// The law, a least-squares fit.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,7 +20,7 @@ impl LogLaw {
             .iter()
             .map(|&(faces, time)| ((faces as f64).ln(), time))
             .collect();
-        let Line { offset, slope, .. } = straight_line(&logs)?;
+        let RegressionLine { offset, slope, .. } = straight_line(&logs)?;
         if slope > 0.0 {
             return Some(Self {
                 a_ns: offset,

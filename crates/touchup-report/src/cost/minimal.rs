@@ -3,7 +3,7 @@
 
 use nalgebra::Point3;
 
-use touchup_geometry::mesh::{FaceId, FaceTree, Nearby, RefitPlan, TriMesh, VertexId};
+use touchup_geometry::mesh::{FaceId, FaceTree, NearbyLeaves, RefitPlan, TriMesh, VertexId};
 use touchup_method::stylus::Sample;
 use touchup_sim::wavy::{FORCE, RADIUS, STIFFNESS};
 
@@ -37,7 +37,7 @@ pub struct MinimalLoop {
 struct StaleBoxes {
     face: Option<FaceId>,
     plan: RefitPlan,
-    nearby: Nearby,
+    nearby: NearbyLeaves,
 }
 
 impl MinimalLoop {

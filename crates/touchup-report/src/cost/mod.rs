@@ -11,7 +11,7 @@ mod stages;
 mod turns;
 
 use super::Effort;
-use super::error::Measured;
+use super::error::MeasureResult;
 pub use log_law::LogLaw;
 pub use minimal::MinimalLoop;
 pub use parry::ParryLoop;
@@ -57,7 +57,7 @@ pub struct Cost {
 /// # Errors
 /// [`MeasureError`](crate::error::MeasureError).
 #[expect(clippy::too_many_lines)]
-pub fn cost(effort: Effort, progress: &mut dyn FnMut(&str)) -> Measured<Cost> {
+pub fn cost(effort: Effort, progress: &mut dyn FnMut(&str)) -> MeasureResult<Cost> {
     let by_edge = recordings::by_edge(effort, progress)?;
     let by_faces = recordings::by_faces(effort, progress)?;
     let sizes: &[usize] = effort.choose(

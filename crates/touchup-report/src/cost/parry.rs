@@ -21,12 +21,12 @@ pub struct ParryLoop {
     /// current mesh
     pub mesh: TriMesh,
     tree: Bvh,
-    region: TouchedRegion,
+    region: MovedRegion,
 }
 
 /// Region that a touch moves.
 #[derive(Default)]
-struct TouchedRegion {
+struct MovedRegion {
     vertices: Vec<VertexId>,
     faces: Vec<FaceId>,
     /// by vertex and by face: number of the last touch that included it
@@ -34,7 +34,7 @@ struct TouchedRegion {
     touches: u32,
 }
 
-impl TouchedRegion {
+impl MovedRegion {
     fn of(mesh: &TriMesh) -> Self {
         Self {
             taken: [vec![0; mesh.vertex_slots()], vec![0; mesh.face_slots()]],
@@ -102,7 +102,7 @@ impl ParryLoop {
         let tree = Bvh::from_iter(BvhBuildStrategy::Binned, leaves);
         Self {
             tree,
-            region: TouchedRegion::of(&mesh),
+            region: MovedRegion::of(&mesh),
             mesh,
         }
     }

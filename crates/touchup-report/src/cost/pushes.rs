@@ -5,7 +5,7 @@ use std::ops::{Div, Sub};
 
 use super::minimal::MinimalLoop;
 use super::turns::{PerSample, TimedCase, Timing, by_block, in_turns};
-use crate::error::{MeasureError, Measured};
+use crate::error::{MeasureError, MeasureResult};
 use crate::{Spread, timed};
 use touchup_geometry::mesh::{FaceTree, TriMesh};
 use touchup_method::haptic::Refiner;
@@ -60,7 +60,7 @@ pub(super) fn touched_plate(
     faces: usize,
     side: f64,
     count: usize,
-) -> Measured<(TriMesh, Vec<Sample>)> {
+) -> MeasureResult<(TriMesh, Vec<Sample>)> {
     Ok((
         plate(faces, side)?,
         (0..count).map(|i| slide_on(side, i, 0.8 * side)).collect(),
@@ -68,7 +68,7 @@ pub(super) fn touched_plate(
 }
 
 /// Refiner of a scene.
-pub(super) fn refiner_of(scene: &Scene, mesh: TriMesh) -> Measured<Refiner> {
+pub(super) fn refiner_of(scene: &Scene, mesh: TriMesh) -> MeasureResult<Refiner> {
     // the force of the slide is in the axes of the scan
     let params = scene
         .refine_params(WrenchFrame::Object)
@@ -77,7 +77,7 @@ pub(super) fn refiner_of(scene: &Scene, mesh: TriMesh) -> Measured<Refiner> {
 }
 
 /// Measures one size.
-pub(super) fn size_cost(faces: usize, timing: Timing) -> Measured<SizeCost> {
+pub(super) fn size_cost(faces: usize, timing: Timing) -> MeasureResult<SizeCost> {
     let (mesh, samples) = touched_plate(faces, SIDE, timing.samples())?;
     let faces = mesh.face_count();
     let (tree_build_s, tree) = timed(|| FaceTree::new(&mesh));
@@ -142,7 +142,7 @@ const COMPENSATION: &str = "compensation: { payload: { mass_kg: 0, centre_mm: [0
                             bias: { force_n: [0, 0, 0], torque_nm: [0, 0, 0] } }";
 
 /// The default scene, and for each part the scene that differs in it.
-fn scenes() -> Measured<Vec<(&'static str, bool, Scene)>> {
+fn scenes() -> MeasureResult<Vec<(&'static str, bool, Scene)>> {
     let default = Scene::default;
     let extra = Scene::from_yaml(&format!("{COMPENSATION}\nbias_tracking:"))?;
     Ok(vec![
@@ -201,7 +201,7 @@ fn scenes() -> Measured<Vec<(&'static str, bool, Scene)>> {
 }
 
 /// Measures every part on a scan of edges of 1 mm.
-pub(super) fn part_costs(faces: usize, timing: Timing) -> Measured<Vec<PartCost>> {
+pub(super) fn part_costs(faces: usize, timing: Timing) -> MeasureResult<Vec<PartCost>> {
     let (mesh, samples) = touched_plate(faces, side_of(faces), timing.samples())?;
     let faces = mesh.face_count();
     let scenes = scenes()?;

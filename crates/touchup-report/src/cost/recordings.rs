@@ -7,7 +7,7 @@ use std::time::Instant;
 use super::parry::ParryLoop;
 use super::pushes::EDGE;
 use crate::Effort;
-use crate::error::{MeasureError, Measured};
+use crate::error::{MeasureError, MeasureResult};
 use touchup_geometry::mesh::FaceTree;
 use touchup_method::stylus::WrenchFrame;
 use touchup_session::live::{Engine, Latencies, Quantiles, Renewal};
@@ -46,7 +46,7 @@ pub struct RecordingCost {
 pub(super) fn by_edge(
     effort: Effort,
     progress: &mut dyn FnMut(&str),
-) -> Measured<Vec<RecordingCost>> {
+) -> MeasureResult<Vec<RecordingCost>> {
     let edges = effort
         .choose(&EDGES[1..], &EDGES)
         .iter()
@@ -61,7 +61,7 @@ pub(super) fn by_edge(
 pub(super) fn by_faces(
     effort: Effort,
     progress: &mut dyn FnMut(&str),
-) -> Measured<Vec<RecordingCost>> {
+) -> MeasureResult<Vec<RecordingCost>> {
     let sizes: &[usize] = effort.choose(
         &[10_000, 100_000],
         &[10_000, 100_000, 1_000_000, 5_000_000, 10_000_000],
@@ -79,7 +79,7 @@ fn recording_cost(
     edge: f64,
     effort: Effort,
     progress: &mut dyn FnMut(&str),
-) -> Measured<RecordingCost> {
+) -> MeasureResult<RecordingCost> {
     progress(&format!(
         "cost: a recording on {faces} faces, edges of {:.2} mm",
         edge * 1e3

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::pushes::{BAREST, refiner_of, touched_plate};
 use super::turns::spread;
-use crate::error::{MeasureError, Measured};
+use crate::error::{MeasureError, MeasureResult};
 use crate::{Spread, timed};
 use touchup_io::recording::{StampSource, Topics, write_recording};
 use touchup_method::stylus::{Message, Sample, StampedPose, StampedWrench, SyncParams};
@@ -34,7 +34,7 @@ pub(super) fn replay_speeds(
     (faces, side): (usize, f64),
     count: usize,
     repeats: usize,
-) -> Measured<Vec<ReplaySpeed>> {
+) -> MeasureResult<Vec<ReplaySpeed>> {
     let folder = tempfile::tempdir().map_err(MeasureError::Folder)?;
     let path = folder.path().join("slide.mcap");
     let (mesh, samples) = touched_plate(faces, side, count)?;
@@ -103,8 +103,8 @@ fn replay(
     path: &Path,
     topics: &Topics,
     sync: SyncParams,
-    mut push: impl FnMut(&Sample) -> Measured<()>,
-) -> Measured<f64> {
+    mut push: impl FnMut(&Sample) -> MeasureResult<()>,
+) -> MeasureResult<f64> {
     let (mut count, mut outcome) = (0, Ok(()));
     let (seconds, replayed) = timed(|| {
         each_sample(

@@ -8,10 +8,10 @@ use nalgebra::{Point3, Vector3};
 use super::pushes::{side_of, touched_plate};
 use super::replay::messages;
 use super::turns::{PerSample, TimedCase, Timing, in_turns, spread};
-use crate::error::{MeasureError, Measured};
+use crate::error::{MeasureError, MeasureResult};
 use crate::{Spread, timed};
 use touchup_features::features::detect;
-use touchup_geometry::mesh::{FaceId, FaceTree, Nearby, RefitPlan, TriMesh};
+use touchup_geometry::mesh::{FaceId, FaceTree, NearbyLeaves, RefitPlan, TriMesh};
 use touchup_io::recording::{RecordingWriter, Topics};
 use touchup_method::haptic::{FaceDynamics, FaceState, RefineError};
 use touchup_method::reconstruct::Patcher;
@@ -55,7 +55,7 @@ pub(super) fn touching(sample: &Sample) -> Point3<f64> {
 }
 
 /// The contact state of each sample.
-fn contacts_of(samples: &[Sample], tip: TipParams) -> Measured<Vec<ContactSample>> {
+fn contacts_of(samples: &[Sample], tip: TipParams) -> MeasureResult<Vec<ContactSample>> {
     let mut estimator = ContactEstimator::new(ContactEstimatorParams::new(tip))?;
     let observe = |sample| Ok(*estimator.observe(sample).map_err(RefineError::from)?);
     samples.iter().map(observe).collect()
@@ -63,7 +63,7 @@ fn contacts_of(samples: &[Sample], tip: TipParams) -> Measured<Vec<ContactSample
 
 /// Times every stage that is callable by itself, on a scan of edges of 1 mm.
 #[expect(clippy::too_many_lines)]
-pub(super) fn stage_costs(faces: usize, timing: Timing) -> Measured<Vec<StageCost>> {
+pub(super) fn stage_costs(faces: usize, timing: Timing) -> MeasureResult<Vec<StageCost>> {
     let (mesh, samples) = touched_plate(faces, side_of(faces), timing.samples())?;
     let tree = FaceTree::new(&mesh);
     let scene = Scene::default();
@@ -86,8 +86,8 @@ pub(super) fn stage_costs(faces: usize, timing: Timing) -> Measured<Vec<StageCos
     let writer = RecordingWriter::new(Cursor::new(Vec::new()), &Topics::default());
     let mut writer = writer.map_err(ReplayError::from)?;
     let mut patcher = Patcher::new(scene.patcher_params().ok_or(MeasureError::NothingMoves)?)?;
-    let (mut last, mut nearby) = (None, Nearby::default());
-    let mut moving = Moving {
+    let (mut last, mut nearby) = (None, NearbyLeaves::default());
+    let mut moving = MovingMesh {
         mesh: mesh.clone(),
         tree: tree.clone(),
         plan: RefitPlan::default(),
@@ -167,14 +167,14 @@ pub(super) fn stage_costs(faces: usize, timing: Timing) -> Measured<Vec<StageCos
 }
 
 /// A separate mesh whose boxes follow it.
-struct Moving {
+struct MovingMesh {
     mesh: TriMesh,
     tree: FaceTree,
     plan: RefitPlan,
     at: Option<FaceId>,
 }
 
-impl Moving {
+impl MovingMesh {
     /// Updates the boxes around the face under the tip, and returns the face. Looks up face and
     /// boxes once per millimetre of travel, as the refiner does once per face.
     fn follow(&mut self, p: &Point3<f64>) -> Option<FaceId> {
@@ -200,7 +200,7 @@ impl Moving {
 }
 
 /// Times the occasional work.
-pub(super) fn seldom_costs(faces: usize, repeats: usize) -> Measured<Vec<SeldomCost>> {
+pub(super) fn seldom_costs(faces: usize, repeats: usize) -> MeasureResult<Vec<SeldomCost>> {
     let (mesh, samples) = touched_plate(faces, side_of(faces), 1000 + RENEWAL * repeats)?;
     let tree = FaceTree::new(&mesh);
     let faces = mesh.face_count();

@@ -7,16 +7,16 @@ use std::time::Instant;
 
 use crate::Spread;
 use crate::allocations::asked;
-use crate::error::{MeasureError, Measured};
+use crate::error::{MeasureError, MeasureResult};
 
 /// One case: does the work of these samples, by number.
 pub(super) struct TimedCase<'a> {
     pub name: &'a str,
-    pub run: Box<dyn FnMut(Range<usize>) -> Measured<()> + 'a>,
+    pub run: Box<dyn FnMut(Range<usize>) -> MeasureResult<()> + 'a>,
 }
 
 impl<'a> TimedCase<'a> {
-    pub fn new(name: &'a str, run: impl FnMut(Range<usize>) -> Measured<()> + 'a) -> Self {
+    pub fn new(name: &'a str, run: impl FnMut(Range<usize>) -> MeasureResult<()> + 'a) -> Self {
         Self {
             name,
             run: Box::new(run),
@@ -27,7 +27,7 @@ impl<'a> TimedCase<'a> {
     pub fn each<T, R>(
         name: &'a str,
         items: &'a [T],
-        mut work: impl FnMut(&'a T) -> Measured<R> + 'a,
+        mut work: impl FnMut(&'a T) -> MeasureResult<R> + 'a,
     ) -> Self {
         Self::new(name, move |block| {
             items[block]
@@ -65,7 +65,7 @@ pub struct PerSample {
 
 /// Times of one case, block by block.
 #[derive(Default)]
-pub(super) struct Timed {
+pub(super) struct BlockTimes {
     /// time of one sample, ns
     pub blocks_ns: Vec<f64>,
     requests: u64,
@@ -74,8 +74,8 @@ pub(super) struct Timed {
     counts: bool,
 }
 
-impl Timed {
-    fn add(&mut self, case: &mut TimedCase, samples: Range<usize>) -> Measured<()> {
+impl BlockTimes {
+    fn add(&mut self, case: &mut TimedCase, samples: Range<usize>) -> MeasureResult<()> {
         let count = samples.len();
         let before = asked();
         let started = Instant::now();
@@ -91,7 +91,7 @@ impl Timed {
         Ok(())
     }
 
-    pub fn per_sample(&self) -> Measured<PerSample> {
+    pub fn per_sample(&self) -> MeasureResult<PerSample> {
         let share = |count: u64| {
             self.counts
                 .then(|| count as f64 / self.samples.max(1) as f64)
@@ -106,13 +106,13 @@ impl Timed {
 
 /// Runs all cases over the same samples: first to warm up, then block by block, each time with
 /// another case first.
-pub(super) fn in_turns(cases: &mut [TimedCase], timing: Timing) -> Measured<Vec<Timed>> {
+pub(super) fn in_turns(cases: &mut [TimedCase], timing: Timing) -> MeasureResult<Vec<BlockTimes>> {
     let counts = asked().is_some();
     let mut timed: Vec<_> = cases
         .iter()
-        .map(|_| Timed {
+        .map(|_| BlockTimes {
             counts,
-            ..Timed::default()
+            ..BlockTimes::default()
         })
         .collect();
     for case in cases.iter_mut() {
@@ -129,7 +129,11 @@ pub(super) fn in_turns(cases: &mut [TimedCase], timing: Timing) -> Measured<Vec<
 }
 
 /// Block by block, the first against the second: their ratio, or their difference in ns.
-pub(super) fn by_block(of: &Timed, to: &Timed, compare: fn(f64, f64) -> f64) -> Measured<Spread> {
+pub(super) fn by_block(
+    of: &BlockTimes,
+    to: &BlockTimes,
+    compare: fn(f64, f64) -> f64,
+) -> MeasureResult<Spread> {
     spread(
         of.blocks_ns
             .iter()
@@ -139,7 +143,7 @@ pub(super) fn by_block(of: &Timed, to: &Timed, compare: fn(f64, f64) -> f64) -> 
 }
 
 /// Spread of times.
-pub(super) fn spread(times: impl IntoIterator<Item = f64>) -> Measured<Spread> {
+pub(super) fn spread(times: impl IntoIterator<Item = f64>) -> MeasureResult<Spread> {
     Spread::of(times.into_iter().collect()).ok_or(MeasureError::NothingTimed)
 }
 
@@ -184,9 +188,9 @@ mod tests {
 
     #[test]
     fn ratios_and_differences_are_of_blocks_side_by_side() {
-        let of = |blocks_ns: &[f64]| Timed {
+        let of = |blocks_ns: &[f64]| BlockTimes {
             blocks_ns: blocks_ns.to_vec(),
-            ..Timed::default()
+            ..BlockTimes::default()
         };
         let (slow, fast) = (of(&[300.0, 20.0, 100.0]), of(&[100.0, 10.0, 100.0]));
         assert_eq!(

@@ -3,10 +3,10 @@
 use super::kind::CoverageKind;
 use super::stated::StatedNumber;
 use super::truth::{feature_numbers, vertex_kind};
-use crate::error::{MeasureError, Measured};
+use crate::error::{MeasureError, MeasureResult};
 use touchup_geometry::mesh::{FaceTree, VertexId};
 use touchup_io::touches_file::as_written;
-use touchup_method::reconstruct::{Patched, Patcher};
+use touchup_method::reconstruct::{PatchedMesh, Patcher};
 use touchup_method::stylus::{Message, Placement, Synchroniser, WrenchFrame};
 use touchup_session::live::{Engine, Renewal};
 use touchup_session::scene::Scene;
@@ -22,7 +22,7 @@ pub(super) fn run(
     world: SimWorld,
     seed: u64,
     longest: f64,
-) -> Measured<Vec<(CoverageKind, StatedNumber)>> {
+) -> MeasureResult<Vec<(CoverageKind, StatedNumber)>> {
     let (plate, drawn) = (Plate::default(), world.draw(seed)?);
     let scene = Scene::from_yaml(&drawn.told_scene(DrawnWorld::lever(&plate)))?;
     let turn = TURNS[(seed.wrapping_sub(1) % TURNS.len() as u64) as usize];
@@ -46,7 +46,7 @@ fn refined(
     drawn: &DrawnWorld,
     plate: &Plate,
     messages: &[Message],
-) -> Measured<(Patched, Patcher)> {
+) -> MeasureResult<(PatchedMesh, Patcher)> {
     let frame = WrenchFrame::Sensor;
     let scan = drawn.scan(plate)?;
     let params = scene
@@ -70,8 +70,8 @@ fn refined(
     Ok((patched, patcher))
 }
 
-fn vertex_numbers(patched: &Patched, plate: &Plate) -> Vec<(CoverageKind, StatedNumber)> {
-    let Patched {
+fn vertex_numbers(patched: &PatchedMesh, plate: &Plate) -> Vec<(CoverageKind, StatedNumber)> {
+    let PatchedMesh {
         mesh,
         support,
         sigma,

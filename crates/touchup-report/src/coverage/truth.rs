@@ -4,7 +4,9 @@ use nalgebra::{Point3, Vector2, Vector3};
 
 use super::kind::CoverageKind;
 use super::stated::StatedNumber;
-use touchup_features::features::{Feature, FittedTo, InspectedQuantity, Kind, Measured};
+use touchup_features::features::{
+    Feature, FeatureKind, FittedTo, InspectedQuantity, MeasuredValue,
+};
 use touchup_method::reconstruct::Support;
 use touchup_sim::{Plate, Surface, SurfacePoint, TruthFeature, TruthShape};
 
@@ -78,13 +80,15 @@ pub(super) fn feature_numbers(
     plate: &Plate,
 ) -> Vec<(CoverageKind, StatedNumber)> {
     let mut numbers = match feature.kind {
-        Kind::Hole | Kind::Slot | Kind::Boss => plate
+        FeatureKind::Hole | FeatureKind::Slot | FeatureKind::Boss => plate
             .features()
             .iter()
             .find_map(|truth| of_walls(feature, truth)),
-        Kind::Plane => of_plane(feature, plate),
-        Kind::Edge => of_edge(feature, plate),
-        Kind::Pocket | Kind::Corner | Kind::Cylinder | Kind::Notch => None,
+        FeatureKind::Plane => of_plane(feature, plate),
+        FeatureKind::Edge => of_edge(feature, plate),
+        FeatureKind::Pocket | FeatureKind::Corner | FeatureKind::Cylinder | FeatureKind::Notch => {
+            None
+        }
     }
     .unwrap_or_default();
     if feature.fitted_to == FittedTo::Mesh {
@@ -95,7 +99,11 @@ pub(super) fn feature_numbers(
     numbers
 }
 
-fn stated(kind: CoverageKind, found: &Measured<f64>, truth: f64) -> (CoverageKind, StatedNumber) {
+fn stated(
+    kind: CoverageKind,
+    found: &MeasuredValue<f64>,
+    truth: f64,
+) -> (CoverageKind, StatedNumber) {
     let (error, std) = (found.value - truth, found.std.unwrap_or(0.0));
     (
         kind,
@@ -111,7 +119,7 @@ fn stated(kind: CoverageKind, found: &Measured<f64>, truth: f64) -> (CoverageKin
 fn across(
     kind: CoverageKind,
     off: Vector2<f64>,
-    centre: &Measured<Point3<f64>>,
+    centre: &MeasuredValue<Point3<f64>>,
 ) -> [(CoverageKind, StatedNumber); 2] {
     let std = centre.std.unwrap_or(0.0) / 2f64.sqrt();
     [off.x, off.y].map(|error| {
@@ -137,18 +145,18 @@ fn of_walls(feature: &Feature, truth: &TruthFeature) -> Option<Vec<(CoverageKind
         return None;
     }
     let place = match feature.kind {
-        Kind::Hole => K::HolePosition,
-        Kind::Slot => K::SlotPosition,
+        FeatureKind::Hole => K::HolePosition,
+        FeatureKind::Slot => K::SlotPosition,
         _ => K::BossPosition,
     };
     let number = |(quantity, size): (InspectedQuantity, f64)| {
         let (_, found) = feature.sizes().find(|(own, _)| *own == quantity)?;
         let kind = match (feature.kind, quantity) {
-            (Kind::Hole, InspectedQuantity::Diameter) => K::HoleDiameter,
-            (Kind::Hole, _) => K::HoleDepth,
-            (Kind::Slot, InspectedQuantity::Width) => K::SlotWidth,
-            (Kind::Slot, InspectedQuantity::Length) => K::SlotLength,
-            (Kind::Slot, _) => K::SlotDepth,
+            (FeatureKind::Hole, InspectedQuantity::Diameter) => K::HoleDiameter,
+            (FeatureKind::Hole, _) => K::HoleDepth,
+            (FeatureKind::Slot, InspectedQuantity::Width) => K::SlotWidth,
+            (FeatureKind::Slot, InspectedQuantity::Length) => K::SlotLength,
+            (FeatureKind::Slot, _) => K::SlotDepth,
             (_, InspectedQuantity::Diameter) => K::BossDiameter,
             _ => K::BossHeight,
         };

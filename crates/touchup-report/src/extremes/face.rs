@@ -3,7 +3,9 @@
 use nalgebra::{Point3, Vector3};
 
 use super::case::{CaseOutcome, Extreme, refused};
-use touchup_method::haptic::{Along, DynamicsError, DynamicsParams, FaceDynamics, FaceState};
+use touchup_method::haptic::{
+    DynamicsError, DynamicsParams, FaceDynamics, FaceState, MotionDirection,
+};
 
 /// The paper's h_min, m, and f_max, N, and α, m/(N·s), and δ.
 const H_MIN: f64 = 0.5e-3;
@@ -21,26 +23,29 @@ fn robust() -> DynamicsParams {
 
 fn paper() -> DynamicsParams {
     DynamicsParams {
-        along: Along::InitialNormal,
+        along: MotionDirection::InitialNormal,
         take_out_rigid_offset: false,
         ..DynamicsParams::default()
     }
 }
 
-type Stepped = Result<FaceState, DynamicsError>;
+type StepResult = Result<FaceState, DynamicsError>;
 
 /// One step of a face that looks up, with the tip `h` above it.
-fn step(params: DynamicsParams, h: f64, force: [f64; 3], dt: f64) -> Stepped {
+fn step(params: DynamicsParams, h: f64, force: [f64; 3], dt: f64) -> StepResult {
     FaceDynamics::new(params)?.step(&UP, &Point3::new(0.0, 0.0, h), &force.into(), dt)
 }
 
 /// One such step under a force along the normal.
-fn pressed(params: DynamicsParams, h: f64, force: f64, dt: f64) -> Stepped {
+fn pressed(params: DynamicsParams, h: f64, force: f64, dt: f64) -> StepResult {
     step(params, h, [0.0, 0.0, force], dt)
 }
 
 /// Outcome in words, with a test of the final state.
-fn outcome(stepped: Stepped, is_right: impl Fn(&FaceState) -> bool) -> CaseOutcome<DynamicsError> {
+fn outcome(
+    stepped: StepResult,
+    is_right: impl Fn(&FaceState) -> bool,
+) -> CaseOutcome<DynamicsError> {
     let face = stepped?;
     let words = format!(
         "b at {:.4e} m along the normal, normal turned by {:.1e} rad",
@@ -51,7 +56,7 @@ fn outcome(stepped: Stepped, is_right: impl Fn(&FaceState) -> bool) -> CaseOutco
 }
 
 /// Outcome of a face that should come to `z` along its first normal.
-fn comes_to(stepped: Stepped, z: f64, tolerance: f64) -> CaseOutcome<DynamicsError> {
+fn comes_to(stepped: StepResult, z: f64, tolerance: f64) -> CaseOutcome<DynamicsError> {
     outcome(stepped, |face| near(face.b.z, z, tolerance))
 }
 

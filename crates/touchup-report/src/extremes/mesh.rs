@@ -20,11 +20,11 @@ const MILLISECOND_NS: i64 = 1_000_000;
 const PLACE: [f64; 2] = [0.3e-3, 0.1e-3];
 
 /// Vertices and faces.
-type Shape = (Vec<Point3<f64>>, Vec<[u32; 3]>);
-type Outcome = CaseOutcome<RefineError>;
+type MeshShape = (Vec<Point3<f64>>, Vec<[u32; 3]>);
+type MeshOutcome = CaseOutcome<RefineError>;
 
 /// A flat square of 6 × 6 cells in the plane z = 0 around `centre`.
-fn square(edge: f64, centre: &Vector3<f64>) -> Shape {
+fn square(edge: f64, centre: &Vector3<f64>) -> MeshShape {
     let (cells, row) = (6, 7);
     let at = |i: u32| (f64::from(i) - 0.5 * f64::from(cells)) * edge;
     let positions = (0..row * row).map(|k| Point3::new(at(k % row), at(k / row), 0.0) + centre);
@@ -33,11 +33,11 @@ fn square(edge: f64, centre: &Vector3<f64>) -> Shape {
     (positions.collect(), faces.collect())
 }
 
-fn plain() -> Shape {
+fn plain() -> MeshShape {
     square(EDGE, &Vector3::zeros())
 }
 
-fn refiner((positions, faces): Shape) -> Result<Refiner, RefineError> {
+fn refiner((positions, faces): MeshShape) -> Result<Refiner, RefineError> {
     let tip = TipParams {
         radius: RADIUS,
         stiffness: Some(STIFFNESS),
@@ -91,7 +91,7 @@ fn press(
 }
 
 /// Presses at a place, with the true surface [`DEPTH`] below the scan.
-fn pressed(shape: Shape, [x, y]: [f64; 2]) -> Outcome {
+fn pressed(shape: MeshShape, [x, y]: [f64; 2]) -> MeshOutcome {
     let mut refiner = refiner(shape)?;
     let (depth, is_right) = press(&mut refiner, Point3::new(x, y, -DEPTH), RADIUS, DEPTH)?;
     Ok((
@@ -109,7 +109,7 @@ fn unchanged(
     mut refiner: Refiner,
     bad: &Sample,
     is_right: impl Fn(&RefineError) -> bool,
-) -> Outcome {
+) -> MeshOutcome {
     let before = refiner.mesh().positions().to_vec();
     let pushed = refiner.push(bad).map(drop);
     refused(pushed, |error| {
@@ -127,7 +127,7 @@ pub(super) fn rows() -> Vec<Extreme> {
 
 fn samples() -> Vec<Extreme> {
     // after a good sample
-    let bad = |change: fn(&mut Sample), is_right: fn(&RefineError) -> bool| -> Outcome {
+    let bad = |change: fn(&mut Sample), is_right: fn(&RefineError) -> bool| -> MeshOutcome {
         let good = sample(5, over(-DEPTH), RADIUS, down());
         let mut bad = Sample {
             stamp_ns: 6 * MILLISECOND_NS,
@@ -167,7 +167,7 @@ fn samples() -> Vec<Extreme> {
 }
 
 /// A second of `force` with the ball above the mesh: inside the mesh it would rightly carve.
-fn unmoved(force: Vector3<f64>) -> Outcome {
+fn unmoved(force: Vector3<f64>) -> MeshOutcome {
     let mut refiner = refiner(plain())?;
     let before = refiner.mesh().positions().to_vec();
     for tick in 1..=1000 {
@@ -183,7 +183,7 @@ fn unmoved(force: Vector3<f64>) -> Outcome {
     Ok((format!("{moved} vertices moved"), moved == 0))
 }
 
-fn paused() -> Outcome {
+fn paused() -> MeshOutcome {
     let run = |pause_ms: i64| -> Result<_, RefineError> {
         let mut refiner = refiner(plain())?;
         for tick in [1, 1 + pause_ms] {
@@ -254,7 +254,7 @@ fn shapes_and_sizes() -> Vec<Extreme> {
     ]
 }
 
-fn far_away() -> Outcome {
+fn far_away() -> MeshOutcome {
     let centre = Vector3::new(1e6, 0.0, 0.0);
     match refiner(square(EDGE, &centre)) {
         Ok(refiner) => unchanged(
@@ -266,7 +266,7 @@ fn far_away() -> Outcome {
     }
 }
 
-fn tiny() -> Outcome {
+fn tiny() -> MeshOutcome {
     let (edge, radius, depth) = (2e-7, 1e-7, 5e-9);
     // a probe so stiff that it bends by less than the size of the mesh
     let stiffness = 2e9;

@@ -2,7 +2,7 @@
 //! of `touchup doctor`.
 
 use super::checked::CheckedRecording;
-use crate::error::Measured;
+use crate::error::MeasureResult;
 use touchup_features::diagnose::{InputFinding, InputMonitor};
 use touchup_geometry::mesh::FaceTree;
 use touchup_method::stylus::{ContactEstimator, ContactEstimatorParams, Synchroniser, WrenchFrame};
@@ -15,7 +15,7 @@ pub(super) fn run(
     seed: u64,
     longest: f64,
     mistakes: &'static [InputMistake],
-) -> Measured<Vec<CheckedRecording>> {
+) -> MeasureResult<Vec<CheckedRecording>> {
     let (plate, drawn) = (Plate::default(), world.draw(seed)?);
     let scene = Scene::from_yaml(&drawn.told_scene(DrawnWorld::lever(&plate)))?;
     let strokes = drawn.strokes_on_plate(&plate, longest, None)?;
@@ -40,7 +40,7 @@ pub(super) fn run(
         .collect()
 }
 
-fn findings(mut scene: Scene, told: &ToldRecording) -> Measured<Vec<InputFinding>> {
+fn findings(mut scene: Scene, told: &ToldRecording) -> MeasureResult<Vec<InputFinding>> {
     scene.tip.get_or_insert_default().ball = told.tip;
     let frame = WrenchFrame::Sensor;
     let params = scene.input_monitor_params(frame);

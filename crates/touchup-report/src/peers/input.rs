@@ -4,7 +4,7 @@ use nalgebra::Point3;
 
 use super::PeerTimes;
 use crate::{Effort, Spread, timed};
-use touchup_geometry::mesh::{FaceTree, MeshError, Nearby, TriMesh};
+use touchup_geometry::mesh::{FaceTree, MeshError, NearbyLeaves, TriMesh};
 use touchup_method::haptic::{RefineError, RefineParams, Refiner, TipParams};
 use touchup_sim::wavy::{RADIUS, SIDE, STIFFNESS, contact_on, slide, wavy_plate};
 
@@ -71,7 +71,7 @@ impl PeersInput {
     pub fn measure(&self, turn: &str) -> Result<PeerTimes, RefineError> {
         let tree = FaceTree::new(&self.mesh);
         let (mut queries, mut next) = (Vec::new(), Vec::new());
-        let (mut last, mut nearby) = (None, Nearby::default());
+        let (mut last, mut nearby) = (None, NearbyLeaves::default());
         for p in &self.queries {
             let (seconds, hit) = timed(|| tree.closest(&self.mesh, p, REACH));
             queries.push(seconds * 1e6);

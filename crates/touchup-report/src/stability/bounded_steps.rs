@@ -8,7 +8,7 @@ use super::face_runs::log_uniform;
 use crate::reference::{HeldFace, Reference};
 use touchup_method::haptic::dynamics::RELATIVE_ERROR;
 use touchup_method::haptic::{
-    Along, ContactModel, DynamicsError, DynamicsParams, FaceDynamics, FaceState, StepRule,
+    ContactModel, DynamicsError, DynamicsParams, FaceDynamics, FaceState, MotionDirection, StepRule,
 };
 
 /// Roundings of |F| and of the tip's distance, beyond the step's control.
@@ -41,10 +41,14 @@ pub struct BoundedStepError {
 pub fn bounded_steps(seed: u64, cases: usize) -> Vec<BoundedStepError> {
     let rng = &mut Pcg64::seed_from_u64(seed);
     let groups = [
-        ("sigmoid, along the force", false, Along::Force),
-        ("sigmoid, along n*(0)", false, Along::InitialNormal),
-        ("spring, along the force", true, Along::Force),
-        ("spring, along n*(0)", true, Along::InitialNormal),
+        ("sigmoid, along the force", false, MotionDirection::Force),
+        (
+            "sigmoid, along n*(0)",
+            false,
+            MotionDirection::InitialNormal,
+        ),
+        ("spring, along the force", true, MotionDirection::Force),
+        ("spring, along n*(0)", true, MotionDirection::InitialNormal),
     ];
     groups
         .map(|(name, is_spring, along)| group(rng, name, is_spring, along, cases))
@@ -55,7 +59,7 @@ fn group(
     rng: &mut Pcg64,
     name: &str,
     is_spring: bool,
-    along: Along,
+    along: MotionDirection,
     cases: usize,
 ) -> BoundedStepError {
     let mut found = BoundedStepError {
@@ -108,7 +112,7 @@ fn group(
 
 /// A stiff sample: time constants of the position down to a billionth of it, of the normal down to
 /// a millionth, the force at any angle.
-fn draw(rng: &mut Pcg64, is_spring: bool, along: Along) -> HeldFace {
+fn draw(rng: &mut Pcg64, is_spring: bool, along: MotionDirection) -> HeldFace {
     let (h_min, f_max) = (log_uniform(rng, -9.0..-3.0), log_uniform(rng, -2.0..3.0));
     let dt = log_uniform(rng, -4.0..0.0);
     let model = if is_spring {

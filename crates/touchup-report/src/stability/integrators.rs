@@ -46,9 +46,9 @@ pub(super) struct HeldSample {
 }
 
 /// Travel along the force, m, and normal of any length.
-type Moved = (f64, Vector3<f64>);
+type TravelAndNormal = (f64, Vector3<f64>);
 /// Travel and normal as one vector.
-type Unknowns = Vector4<f64>;
+type StateVector = Vector4<f64>;
 
 impl Integrator {
     /// Suffix of a file name: the words of its name.
@@ -76,11 +76,11 @@ impl Integrator {
         params: &DynamicsParams,
         n: &Vector3<f64>,
         held: &HeldSample,
-    ) -> Option<Moved> {
+    ) -> Option<TravelAndNormal> {
         if let Some(rule) = self.rule() {
             return by_touchup(&DynamicsParams { rule, ..*params }, n, held);
         }
-        let rate = |y: &Unknowns| rate(params, held, y);
+        let rate = |y: &StateVector| rate(params, held, y);
         let start = Vector4::new(0.0, n.x, n.y, n.z);
         let end = match self {
             Self::ExplicitEuler => start + rate(&start) * held.dt,
@@ -97,7 +97,11 @@ impl Integrator {
     }
 }
 
-fn by_touchup(params: &DynamicsParams, n: &Vector3<f64>, held: &HeldSample) -> Option<Moved> {
+fn by_touchup(
+    params: &DynamicsParams,
+    n: &Vector3<f64>,
+    held: &HeldSample,
+) -> Option<TravelAndNormal> {
     let dynamics = FaceDynamics::new(*params).ok()?;
     let face = FaceState {
         b: nalgebra::Point3::origin(),
@@ -114,7 +118,7 @@ fn by_touchup(params: &DynamicsParams, n: &Vector3<f64>, held: &HeldSample) -> O
 }
 
 /// Eq 6 and 7 along the force, written independently: velocity along F (m/s) and normal (1/s).
-fn rate(params: &DynamicsParams, held: &HeldSample, y: &Unknowns) -> Unknowns {
+fn rate(params: &DynamicsParams, held: &HeldSample, y: &StateVector) -> StateVector {
     let n = Vector3::new(y[1], y[2], y[3]);
     let magnitude = held.force.norm();
     let towards = held.force / magnitude;
@@ -153,15 +157,15 @@ fn scale(params: &DynamicsParams, held: &HeldSample) -> f64 {
 /// Solves y = y₀ + dt · rate(y) by Newton's method with a difference Jacobian; halves a step that
 /// increases the residual.
 fn implicit_euler(
-    start: &Unknowns,
+    start: &StateVector,
     dt: f64,
     length: f64,
-    rate: impl Fn(&Unknowns) -> Unknowns,
-) -> Option<Unknowns> {
+    rate: impl Fn(&StateVector) -> StateVector,
+) -> Option<StateVector> {
     let size = Vector4::new(length, 1.0, 1.0, 1.0);
     // everything in units of its size
     let residual =
-        |z: &Unknowns| z - (start + rate(&z.component_mul(&size)) * dt).component_div(&size);
+        |z: &StateVector| z - (start + rate(&z.component_mul(&size)) * dt).component_div(&size);
     let mut z = start.component_div(&size);
     let mut left = residual(&z);
     for _ in 0..NEWTON_STEPS {
@@ -173,7 +177,7 @@ fn implicit_euler(
         let step = jacobian.lu().solve(&left)?;
         let mut share = 1.0;
         let mut next = z - step;
-        let is_worse = |next: &Unknowns| {
+        let is_worse = |next: &StateVector| {
             residual(next)
                 .norm()
                 .partial_cmp(&left.norm())
@@ -197,7 +201,7 @@ fn implicit_euler(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use touchup_method::haptic::Along;
+    use touchup_method::haptic::MotionDirection;
 
     /// A spring from h = 1 mm to rest at 0 without force along n: dh/dt = −h/τ, with known solution
     /// and known discrete steps.
@@ -211,7 +215,7 @@ mod tests {
             alpha_m_per_n_s: 0.1,
             beta_per_n2_s: 0.0,
             rule: StepRule::Lie,
-            along: Along::Force,
+            along: MotionDirection::Force,
             take_out_rigid_offset: false,
         };
         // 2 N rest at h = −2 mm: 3 mm to go at z = α k dt = 0.5

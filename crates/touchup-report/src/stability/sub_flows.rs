@@ -7,7 +7,9 @@ use rand_pcg::Pcg64;
 
 use super::face_runs::log_uniform;
 use crate::double_double::Double2;
-use touchup_method::haptic::{Along, ContactModel, DynamicsParams, FaceDynamics, FaceState};
+use touchup_method::haptic::{
+    ContactModel, DynamicsParams, FaceDynamics, FaceState, MotionDirection,
+};
 
 /// Halvings of the bracket: from 1e9 to below a rounding of the residual.
 const BISECTIONS: usize = 140;
@@ -110,7 +112,7 @@ fn stepped(
     t: f64,
 ) -> Option<FaceState> {
     let printed = DynamicsParams {
-        along: Along::InitialNormal,
+        along: MotionDirection::InitialNormal,
         take_out_rigid_offset: false,
         ..DynamicsParams::default()
     };

@@ -9,28 +9,28 @@ use touchup_document::number::range;
 const STEPS: usize = 12;
 
 /// A method's quantity on an axis: its label, its column and the value, all on a logarithmic scale.
-type Quantity = (
+type AxisQuantity = (
     &'static str,
     &'static str,
     fn(&MethodResult, &TouchedError) -> Spread,
 );
 
-const TOTAL: Quantity = ("total run time, s", "total_s", |result, _| result.total_s);
-const PER_SAMPLE: Quantity = ("time per sample, µs", "time_per_sample_us", |result, _| {
+const TOTAL: AxisQuantity = ("total run time, s", "total_s", |result, _| result.total_s);
+const PER_SAMPLE: AxisQuantity = ("time per sample, µs", "time_per_sample_us", |result, _| {
     result.per_sample_us
 });
-const MEAN: Quantity = ("mean surface error, mm", "mean_error_mm", |_, error| {
+const MEAN: AxisQuantity = ("mean surface error, mm", "mean_error_mm", |_, error| {
     error.mean_mm().into()
 });
-const P95: Quantity = ("surface error p95, mm", "p95_error_mm", |_, error| {
+const P95: AxisQuantity = ("surface error p95, mm", "p95_error_mm", |_, error| {
     error.p95_mm().into()
 });
-const NORMAL: Quantity = ("mean normal error, deg", "normal_error_deg", |_, error| {
+const NORMAL: AxisQuantity = ("mean normal error, deg", "normal_error_deg", |_, error| {
     error.normal_mean_deg.into()
 });
 
 /// Figures with a mark for each method: id, title, horizontal and vertical quantity.
-const BY_METHOD: [(&str, &str, [Quantity; 2]); 3] = [
+const BY_METHOD: [(&str, &str, [AxisQuantity; 2]); 3] = [
     (
         "error_total",
         "Mean surface error against total run time",
@@ -48,7 +48,7 @@ const BY_METHOD: [(&str, &str, [Quantity; 2]); 3] = [
     ),
 ];
 
-fn axis((label, column, _): Quantity) -> Axis {
+fn axis((label, column, _): AxisQuantity) -> Axis {
     Axis::log(label, column)
 }
 
@@ -82,7 +82,7 @@ impl WholeScan {
         &self,
         case: &CaseResult,
         scan: &ScanResult,
-        (id, title, [x, y]): (&str, &str, [Quantity; 2]),
+        (id, title, [x, y]): (&str, &str, [AxisQuantity; 2]),
     ) -> Figure {
         let mark = |result: &MethodResult, error: &TouchedError| {
             Mark::at(x.2(result, error), y.2(result, error))

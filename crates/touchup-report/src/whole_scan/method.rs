@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use super::baselines::{ContactSculptor, GaussianParams, GaussianSurface};
 use super::part::{GivenPart, Part};
-use crate::error::Measured;
+use crate::error::MeasureResult;
 use crate::timed;
 use touchup_geometry::mesh::{FaceTree, TriMesh};
 use touchup_method::haptic::{RefineParams, RoiSize, StepRule};
@@ -92,11 +92,11 @@ pub(super) struct RunLimits {
 }
 
 /// A run from the scan to the result.
-pub(super) struct Run {
+pub(super) struct MethodRun {
     pub mesh: TriMesh,
     /// time before the first sample, s
     pub build_s: f64,
-    pub fed: Fed,
+    pub fed: FeedReport,
     /// time after the last sample, s
     pub end_s: f64,
     /// available samples or touches
@@ -105,9 +105,9 @@ pub(super) struct Run {
     pub cut_back_share: f64,
 }
 
-/// Input to a method, one by one.
+/// Times and counts of the input to a method.
 #[derive(Default)]
-pub(super) struct Fed {
+pub(super) struct FeedReport {
     /// total time, s
     pub time_s: f64,
     /// samples or touches
@@ -125,9 +125,9 @@ fn feed<T, E: Display>(
     lap: usize,
     longest_s: f64,
     mut take: impl FnMut(T) -> Result<(), E>,
-) -> Fed {
+) -> FeedReport {
     let begun = Instant::now();
-    let mut fed = Fed::default();
+    let mut fed = FeedReport::default();
     for item in items {
         fed.given += 1;
         if let Err(error) = take(item) {
@@ -153,7 +153,7 @@ pub(super) fn run(
     part: &Part,
     scan: &TriMesh,
     limits: &RunLimits,
-) -> Measured<Run> {
+) -> MeasureResult<MethodRun> {
     match method {
         RefineMethod::ContactPoints => Ok(sculpt(part, scan, limits)),
         RefineMethod::GaussianProcess => Ok(fit_gaussian(part, scan, limits)),
@@ -187,7 +187,12 @@ fn params(method: RefineMethod, part: &GivenPart) -> RefineParams {
 }
 
 /// The haptic update, with the patch if the method has one.
-fn refine(method: RefineMethod, part: &Part, scan: &TriMesh, limits: &RunLimits) -> Measured<Run> {
+fn refine(
+    method: RefineMethod,
+    part: &Part,
+    scan: &TriMesh,
+    limits: &RunLimits,
+) -> MeasureResult<MethodRun> {
     let GivenPart {
         samples,
         tip,
@@ -204,7 +209,7 @@ fn refine(method: RefineMethod, part: &Part, scan: &TriMesh, limits: &RunLimits)
     let fed = feed(samples.iter(), CLOCK_EVERY, limits.longest_s, |sample| {
         engine.push(sample).map(drop)
     });
-    let (end_s, finished) = timed(|| -> Measured<_> {
+    let (end_s, finished) = timed(|| -> MeasureResult<_> {
         let mut ended = engine.finish()?;
         let counts = *ended.refiner.counts();
         let Some(mut patcher) = ended.patcher.take() else {
@@ -215,7 +220,7 @@ fn refine(method: RefineMethod, part: &Part, scan: &TriMesh, limits: &RunLimits)
     });
     let (counts, mesh) = finished?;
     let cut_back_share = counts.cut_back as f64 / counts.moved.max(1) as f64;
-    Ok(Run {
+    Ok(MethodRun {
         mesh,
         build_s,
         fed,
@@ -225,13 +230,13 @@ fn refine(method: RefineMethod, part: &Part, scan: &TriMesh, limits: &RunLimits)
     })
 }
 
-fn sculpt(part: &Part, scan: &TriMesh, limits: &RunLimits) -> Run {
+fn sculpt(part: &Part, scan: &TriMesh, limits: &RunLimits) -> MethodRun {
     let (contacts, radius) = (&part.contacts, part.given.tip.radius);
     let (build_s, mut sculptor) = timed(|| ContactSculptor::new(scan, radius, radius));
     let fed = feed(contacts.iter(), CLOCK_EVERY, limits.longest_s, |contact| {
         sculptor.push(&contact.reported).map(drop).ok_or(NO_CONTACT)
     });
-    Run {
+    MethodRun {
         mesh: sculptor.mesh,
         build_s,
         fed,
@@ -241,7 +246,7 @@ fn sculpt(part: &Part, scan: &TriMesh, limits: &RunLimits) -> Run {
     }
 }
 
-fn fit_gaussian(part: &Part, scan: &TriMesh, limits: &RunLimits) -> Run {
+fn fit_gaussian(part: &Part, scan: &TriMesh, limits: &RunLimits) -> MethodRun {
     let GivenPart {
         scan_noise, tip, ..
     } = &part.given;
@@ -261,7 +266,7 @@ fn fit_gaussian(part: &Part, scan: &TriMesh, limits: &RunLimits) -> Run {
         |contact| surface.push(contact.point).then_some(()).ok_or(NO_CONTACT),
     );
     let (end_s, mesh) = timed(|| surface.mesh());
-    Run {
+    MethodRun {
         mesh,
         build_s,
         fed,

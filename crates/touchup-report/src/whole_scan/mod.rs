@@ -12,14 +12,14 @@ mod text;
 mod touched_error;
 
 pub use baselines::{ContactSculptor, GaussianParams, GaussianProcess, GaussianSurface};
+use method::{MethodRun, RunLimits, run};
 pub use method::{Reach, RefineMethod};
-use method::{Run, RunLimits, run};
 pub use part::GivenPart;
 use part::{Part, parts};
 pub use touched_error::TouchedError;
 
 use super::convergence::straight_line;
-use super::error::Measured;
+use super::error::MeasureResult;
 use super::{Effort, Spread};
 use touchup_features::compare::CompareError;
 use touchup_geometry::mesh::TriMesh;
@@ -179,11 +179,11 @@ struct Trial<'a> {
     /// for each run: total s, µs per sample, and ms after the last one
     times: Vec<[f64; 3]>,
     /// results common to all runs, and the touch times of the first
-    first: Option<(Run, Result<TouchedError, CompareError>)>,
+    first: Option<(MethodRun, Result<TouchedError, CompareError>)>,
 }
 
 impl Trial<'_> {
-    fn run(&mut self, limits: &RunLimits) -> Measured<()> {
+    fn run(&mut self, limits: &RunLimits) -> MeasureResult<()> {
         let run = run(self.method, self.part, self.scan, limits)?;
         let samples_s = run.fed.time_s + run.end_s;
         let per_sample_us = samples_s * 1e6 / run.fed.given.max(1) as f64;
@@ -198,7 +198,7 @@ impl Trial<'_> {
 
     fn result(&self, before: &TouchedError) -> Option<MethodResult> {
         let (
-            Run {
+            MethodRun {
                 fed,
                 offered,
                 cut_back_share,
@@ -259,7 +259,7 @@ pub fn whole_scan(
     effort: Effort,
     given: Option<&GivenPart>,
     progress: &mut dyn FnMut(&str),
-) -> Measured<WholeScan> {
+) -> MeasureResult<WholeScan> {
     let (repeats, slow_s) = (effort.choose(3, 7), effort.choose(0.25, 2.0));
     let limits = RunLimits {
         longest_s: effort.choose(2.0, 20.0),
@@ -312,8 +312,8 @@ pub fn whole_scan(
     })
 }
 
-fn case(part: &Part, trials: &[Trial]) -> Measured<CaseResult> {
-    let result = |scan: &TriMesh| -> Measured<_> {
+fn case(part: &Part, trials: &[Trial]) -> MeasureResult<CaseResult> {
+    let result = |scan: &TriMesh| -> MeasureResult<_> {
         let before = part.error_of(scan)?;
         let own = trials.iter().filter(|trial| std::ptr::eq(trial.scan, scan));
         let methods = own.filter_map(|trial| trial.result(&before)).collect();

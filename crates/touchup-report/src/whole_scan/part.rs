@@ -5,7 +5,7 @@ use nalgebra::{Point3, Vector3};
 use super::touched_error::TouchedError;
 use crate::Effort;
 use crate::convergence::region_over;
-use crate::error::{MeasureError, Measured};
+use crate::error::{MeasureError, MeasureResult};
 use touchup_features::compare::{CompareError, TouchedRegion};
 use touchup_geometry::mesh::{FaceTree, TriMesh};
 use touchup_method::haptic::TipParams;
@@ -14,8 +14,8 @@ use touchup_method::stylus::{
     SyncParams, Synchroniser,
 };
 use touchup_sim::{
-    Lines, PathParams, Peaks, Plate, ScannerParams, SimError, Stroke, StylusParams, Surface,
-    add_vertex_noise, plan_demo, raster, scan, touch,
+    PathParams, Peaks, Plate, RasterDirection, ScannerParams, SimError, Stroke, StylusParams,
+    Surface, add_vertex_noise, plan_demo, raster, scan, touch,
 };
 
 /// A caller's scan, true part, and contacts; all in O.
@@ -72,7 +72,7 @@ pub(super) fn parts(
     effort: Effort,
     given: Option<&GivenPart>,
     progress: &mut dyn FnMut(&str),
-) -> Measured<Vec<Part>> {
+) -> MeasureResult<Vec<Part>> {
     // the given part first: it may be refused
     let given = given
         .map(|given| Part::new(given.clone(), Vec::new()))
@@ -92,7 +92,7 @@ fn simulated(
     (surface, truth): (&dyn Surface, TriMesh),
     path: &[Stroke],
     mut scans: Vec<TriMesh>,
-) -> Measured<Part> {
+) -> MeasureResult<Part> {
     let params = StylusParams::default();
     let touch = touch(surface, path, &params, SEED)?;
     let mut sync = Synchroniser::new(SyncParams::default())?;
@@ -119,7 +119,7 @@ fn simulated(
 }
 
 /// Peaks: vertices with the noise and the bias of the usual scanner, and a raster over it.
-fn touched_peaks(effort: Effort) -> Measured<Part> {
+fn touched_peaks(effort: Effort) -> MeasureResult<Part> {
     let peaks = Peaks::default();
     let ScannerParams { noise, bias, .. } = ScannerParams::default();
     let scanned = |&edge: &f64| -> Result<TriMesh, SimError> {
@@ -135,7 +135,7 @@ fn touched_peaks(effort: Effort) -> Measured<Part> {
     );
     let path = raster(
         &region,
-        Lines::AlongX,
+        RasterDirection::AlongX,
         &PathParams {
             pitch: 1e-3,
             ..PathParams::default()
@@ -149,7 +149,7 @@ fn touched_peaks(effort: Effort) -> Measured<Part> {
 }
 
 /// The demo's plate with its scan and touches; a quick one in one raster over its features.
-fn touched_plate(effort: Effort) -> Measured<Part> {
+fn touched_plate(effort: Effort) -> MeasureResult<Part> {
     let (plate, usual) = (Plate::default(), ScannerParams::default());
     let mut path = plan_demo(&plate, &PathParams::default())?;
     if effort.is_quick {
@@ -176,7 +176,7 @@ fn touched_plate(effort: Effort) -> Measured<Part> {
 
 impl Part {
     /// - `others`: scans beside the given one.
-    fn new(given: GivenPart, others: Vec<TriMesh>) -> Measured<Self> {
+    fn new(given: GivenPart, others: Vec<TriMesh>) -> MeasureResult<Self> {
         let GivenPart {
             truth,
             tip,

@@ -4,7 +4,7 @@ use touchup_features::compare::{
     CompareError, Summary, TouchedRegion, angle_between, closest_places, deviations,
     sample_surface, surface_area,
 };
-use touchup_geometry::mesh::{Alone, FaceTree, TriMesh};
+use touchup_geometry::mesh::{FaceTree, SerialWorkers, TriMesh};
 use touchup_geometry::numeric::quantile;
 
 /// Points on the mesh for each m²: four in a square millimetre.
@@ -49,7 +49,7 @@ impl TouchedError {
             region.contacts(),
             mesh,
             &FaceTree::new(mesh),
-            &Alone,
+            &SerialWorkers,
         )?);
         let density = DENSITY.min(MOST_POINTS / surface_area(mesh));
         let places = sample_surface(mesh, density, SEED);

@@ -46,7 +46,7 @@ pub enum SolverSetting {
 
 /// Final state of an integrator, and its cost.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Solved {
+pub struct SolverResult {
     /// at the end of the sample
     pub face: FaceState,
     /// evaluations of the right-hand side; a Jacobian counts as four, an exact flow as one
@@ -76,7 +76,7 @@ impl Method {
     }
 
     /// The face at the end of the sample; `None` if it gave up, or for a non-finite result.
-    pub fn solve(self, problem: &Problem, setting: SolverSetting) -> Option<Solved> {
+    pub fn solve(self, problem: &Problem, setting: SolverSetting) -> Option<SolverResult> {
         let (start, end, scale) = (problem.start(), problem.dt_s, problem.scale());
         let count = Cell::new(0u64);
         let rate = |y: &State| {
@@ -109,7 +109,7 @@ impl Method {
             n: Vector3::new(state[1], state[2], state[3]),
         };
         let is_finite = state.iter().all(|x| x.is_finite());
-        is_finite.then_some(Solved {
+        is_finite.then_some(SolverResult {
             face,
             evaluations: count.get(),
         })
@@ -144,7 +144,7 @@ fn moved(y: &State, dt: f64, rate: &State) -> State {
     [0, 1, 2, 3].map(|i| y[i] + dt * rate[i])
 }
 
-fn exact_steps(problem: &Problem, rule: StepRule, steps: usize) -> Option<Solved> {
+fn exact_steps(problem: &Problem, rule: StepRule, steps: usize) -> Option<SolverResult> {
     let dynamics = FaceDynamics::new(problem.params(rule)).ok()?;
     let (tip, dt) = (Point3::from(problem.arm), problem.dt_s / steps as f64);
     let (mut face, mut evaluations) = (problem.face(), 0);
@@ -160,5 +160,5 @@ fn exact_steps(problem: &Problem, rule: StepRule, steps: usize) -> Option<Solved
         };
         face = next;
     }
-    Some(Solved { face, evaluations })
+    Some(SolverResult { face, evaluations })
 }

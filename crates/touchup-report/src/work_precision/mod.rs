@@ -9,7 +9,7 @@ mod text;
 
 use std::hint::black_box;
 
-pub use method::{Method, Solved, SolverSetting};
+pub use method::{Method, SolverResult, SolverSetting};
 pub use problem::Problem;
 
 use super::{Effort, Spread, timed};
@@ -72,7 +72,7 @@ pub struct IntegratorRun {
     pub error_m: f64,
     /// |n − n_ref| at the end: the angle, rad, and the error of the length
     pub normal_error: f64,
-    /// as in [`Solved`]
+    /// as in [`SolverResult`]
     pub evaluations: u64,
     /// for the whole sample, s
     pub time_s: Spread,
@@ -115,7 +115,7 @@ fn case(h_min_m: f64, tilt_deg: f64, effort: Effort, repeats: usize) -> Option<F
     let curve = |method: Method| {
         let settings = method.settings(effort);
         let run = |&setting: &SolverSetting| {
-            let Solved { face, evaluations } = method.solve(&problem, setting)?;
+            let SolverResult { face, evaluations } = method.solve(&problem, setting)?;
             let (error_m, normal_error) = (
                 (face.b - right.b).norm().max(floor_m),
                 (face.n - right.n).norm(),

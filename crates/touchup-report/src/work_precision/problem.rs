@@ -8,7 +8,7 @@
 use nalgebra::{Matrix3, Matrix4, Point3, Vector3, Vector4};
 
 use crate::reference::HeldFace;
-use touchup_method::haptic::{Along, ContactModel, DynamicsParams, FaceState, StepRule};
+use touchup_method::haptic::{ContactModel, DynamicsParams, FaceState, MotionDirection, StepRule};
 
 /// Travel along n*(0), m, and the normal.
 pub type State = [f64; 4];
@@ -71,7 +71,7 @@ impl Problem {
             alpha_m_per_n_s: ALPHA_M_PER_N_S,
             beta_per_n2_s: BETA_PER_N2_S,
             rule,
-            along: Along::InitialNormal,
+            along: MotionDirection::InitialNormal,
             take_out_rigid_offset: false,
         }
     }

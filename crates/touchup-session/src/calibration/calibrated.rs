@@ -32,7 +32,7 @@ impl CalibrationKind {
 }
 
 /// A printable result of a calibration that changes a scene.
-pub trait Calibrated: Serialize + Display {
+pub trait CalibrationResult: Serialize + Display {
     /// Sets the result in `scene`; returns the settings for its text, and one line on their source.
     fn set_in(&self, scene: &mut Scene) -> (Vec<Setting>, String);
 }
@@ -75,7 +75,7 @@ const BEFORE_DATE: &str = "; ";
 /// [`SceneError`] if the text is no scene, or the result cannot be set in it.
 pub fn calibrated_scene(
     yaml: &str,
-    found: &impl Calibrated,
+    found: &impl CalibrationResult,
     now: SystemTime,
 ) -> Result<String, SceneError> {
     // without the files that it names, which are not part of the text
@@ -119,7 +119,7 @@ mod tests {
         }
     }
 
-    impl Calibrated for LongStylus {
+    impl CalibrationResult for LongStylus {
         fn set_in(&self, scene: &mut Scene) -> (Vec<Setting>, String) {
             scene.tip.get_or_insert_default().offset = Some(Vector3::new(0.0, 0.0, -0.125));
             (

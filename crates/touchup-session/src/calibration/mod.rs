@@ -13,7 +13,9 @@ mod stiffness;
 mod tip;
 mod vector;
 
-pub use calibrated::{Calibrated, Calibration, CalibrationKind, calibrated_on, calibrated_scene};
+pub use calibrated::{
+    Calibration, CalibrationKind, CalibrationResult, calibrated_on, calibrated_scene,
+};
 pub use error::CalibrationError;
 pub use payload::{
     PayloadCalibrationParams, PayloadFound, WeighedFound, calibrate_payload,

@@ -17,7 +17,7 @@ use touchup_io::static_poses::read_static_poses;
 use touchup_method::stylus::{Payload, SensorBias, WrenchFrame};
 use touchup_probing::execute::{NotReached, PayloadReadings};
 
-use super::calibrated::{Calibrated, Calibration};
+use super::calibrated::{Calibration, CalibrationResult};
 use super::error::CalibrationError;
 use super::recording::CalibrationRecording;
 use super::vector::{Vector, rounded};
@@ -192,7 +192,7 @@ reported! {
     }
 }
 
-impl Calibrated for PayloadFound {
+impl CalibrationResult for PayloadFound {
     fn set_in(&self, scene: &mut Scene) -> (Vec<Setting>, String) {
         let digits = |values: &[f64; 3], digits| values.map(|x| rounded(x, digits));
         let (mass_kg, gravity_m_per_s2) = (
@@ -287,7 +287,7 @@ pub struct WeighedFound {
     not_reached: Vec<String>,
 }
 
-impl Calibrated for WeighedFound {
+impl CalibrationResult for WeighedFound {
     fn set_in(&self, scene: &mut Scene) -> (Vec<Setting>, String) {
         let PayloadFound {
             static_segments,

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use touchup_io::recording::{RecordingLayout, StampSource};
 use touchup_method::stylus::{Placement, Sample, WrenchFrame};
 
-use crate::replay::{Recording, ReplayError, Replayed, each_sample, marker_filter};
+use crate::replay::{Recording, ReplayError, ReplaySummary, each_sample, marker_filter};
 use crate::scene::Scene;
 
 /// An open recording for a calibration.
@@ -55,7 +55,7 @@ impl CalibrationRecording {
         scene: &Scene,
         at_each: &mut dyn FnMut(),
         each: impl FnMut(&Sample),
-    ) -> Result<Replayed, ReplayError> {
+    ) -> Result<ReplaySummary, ReplayError> {
         let markers = marker_filter(scene, self.markers_topic.as_deref())?;
         let placement = scene.placement().map(|placement| Placement {
             pose_wo: None,

@@ -9,7 +9,7 @@ use touchup_features::calibrate::{DwellFinder, DwellParams};
 use touchup_io::pairs_file::{PairsFile, read_pairs, read_scan_points};
 use touchup_method::stylus::{ContactEstimator, ContactEstimatorParams};
 
-use super::calibrated::{Calibrated, Calibration};
+use super::calibrated::{Calibration, CalibrationResult};
 use super::error::CalibrationError;
 use super::recording::CalibrationRecording;
 use super::vector::rounded;
@@ -153,7 +153,7 @@ reported! {
     }
 }
 
-impl Calibrated for ScanFound {
+impl CalibrationResult for ScanFound {
     fn set_in(&self, scene: &mut Scene) -> (Vec<Setting>, String) {
         let ScanMotion {
             position_mm,

@@ -4,7 +4,7 @@ use std::fmt;
 
 use touchup_probing::execute::Repeatability;
 
-use super::calibrated::Calibrated;
+use super::calibrated::CalibrationResult;
 use super::vector::rounded;
 use crate::reported;
 use crate::scene::{Scene, Setting};
@@ -21,7 +21,7 @@ reported! {
     }
 }
 
-impl Calibrated for StiffnessFound {
+impl CalibrationResult for StiffnessFound {
     fn set_in(&self, scene: &mut Scene) -> (Vec<Setting>, String) {
         let stiffness_n_per_mm = rounded(self.stiffness_n_per_mm, 3);
         scene.tip.get_or_insert_default().ball.stiffness = Some(stiffness_n_per_mm * 1e3);

@@ -8,9 +8,9 @@ use touchup_features::calibrate::{
     PlaneTipError, PlaneTipFit, SwingPose, TipFit, TipFitParams, VectorEstimate, fit_tip,
     fit_tip_by_plane,
 };
-use touchup_probing::execute::{Cell, NotReached, TipPoses};
+use touchup_probing::execute::{NotReached, RobotCell, TipPoses};
 
-use super::calibrated::{Calibrated, Calibration};
+use super::calibrated::{Calibration, CalibrationResult};
 use super::error::CalibrationError;
 use super::recording::CalibrationRecording;
 use super::vector::{Vector, rounded};
@@ -81,7 +81,7 @@ pub fn calibrate_tip(
 /// [`PlaneTipError`]
 pub fn calibrate_tip_by_arm(
     measured: &TipPoses,
-    cell: &Cell,
+    cell: &RobotCell,
 ) -> Result<Calibration<PivotFound>, PlaneTipError> {
     let TipPoses {
         poses_bf,
@@ -114,7 +114,7 @@ reported! {
     }
 }
 
-impl Calibrated for TipFound {
+impl CalibrationResult for TipFound {
     fn set_in(&self, scene: &mut Scene) -> (Vec<Setting>, String) {
         let offset_mm = self.offset_mm.value.map(|x| rounded(x, 7));
         scene.tip.get_or_insert_default().offset = Some(Vector3::from(offset_mm) / 1e3);
@@ -153,7 +153,7 @@ impl fmt::Display for TipFound {
 reported! {
     /// The centre of the ball in the flange of an arm.
     #[derive(Clone)]
-    pub struct PivotFound, fn of(fit: &PlaneTipFit, cell: &Cell, unreached: &[NotReached]) {
+    pub struct PivotFound, fn of(fit: &PlaneTipFit, cell: &RobotCell, unreached: &[NotReached]) {
         touches: usize = fit.touches,
         /// centre of the ball in the flange
         tip_position_mm: Vector = Vector::of(&moved(cell.pose_ft.translation.vector, &fit.offset), 1e3),
@@ -172,7 +172,7 @@ fn moved(from: Vector3<f64>, by: &VectorEstimate) -> VectorEstimate {
     }
 }
 
-impl Calibrated for PivotFound {
+impl CalibrationResult for PivotFound {
     fn set_in(&self, scene: &mut Scene) -> (Vec<Setting>, String) {
         let tip_position_mm = self.tip_position_mm.value.map(|mm| rounded(mm, 7));
         scene.robot.get_or_insert_default().tip_position = Vector3::from(tip_position_mm) / 1e3;

@@ -2,19 +2,21 @@
 
 use std::sync::Arc;
 
-use touchup_geometry::mesh::{Changes, FaceId, FaceTree, MeshError, Simplified, TriMesh, VertexId};
+use touchup_geometry::mesh::{
+    Changes, FaceId, FaceTree, MeshError, SimplifiedMesh, TriMesh, VertexId,
+};
 use touchup_method::haptic::{RefineParams, Refiner};
 use touchup_method::reconstruct::{PatchDelta, Support};
 
-use super::shown::{Scans, Shown};
+use super::shown::{Scans, ShownMesh};
 
 /// A fine scan and its simplified copy.
 #[derive(Debug)]
 pub(super) struct Detail {
     scan: OriginalScan,
-    simplified: Simplified,
+    simplified: SimplifiedMesh,
     /// present after [`Self::watch`]
-    shown: Option<Shown>,
+    shown: Option<ShownMesh>,
     rests: u64,
 }
 
@@ -39,7 +41,7 @@ impl Detail {
         let Some(edge) = refine.simplified_edge(scan.mean_edge()) else {
             return Ok((scan, None));
         };
-        let simplified = Simplified::new(&scan, edge)?;
+        let simplified = SimplifiedMesh::new(&scan, edge)?;
         // specks alone: nothing is left of them
         if simplified.mesh.face_count() == 0 {
             return Ok((scan, None));
@@ -84,12 +86,12 @@ impl Detail {
 
     /// Starts the shown mesh.
     pub fn watch(&mut self) {
-        self.shown = Some(Shown::new(self.scans()));
+        self.shown = Some(ShownMesh::new(self.scans()));
     }
 
     /// The shown mesh, as it has followed the working mesh; `None` before [`Self::watch`].
     pub fn shown(&self) -> Option<&TriMesh> {
-        self.shown.as_ref().map(Shown::mesh)
+        self.shown.as_ref().map(ShownMesh::mesh)
     }
 
     /// Changes of the shown mesh, as [`TriMesh::take_changes`], after it takes over up to `most`

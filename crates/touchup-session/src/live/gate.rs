@@ -3,7 +3,7 @@
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::time::Instant;
 
-use crate::clock::{Clock, Working, locked};
+use crate::clock::{Clock, WorkGuard, locked};
 
 /// Demands a permit for each renewal of the patch, and makes the time of a clock wait for the
 /// patch. The default lets everything through.
@@ -53,7 +53,7 @@ impl Gate {
     }
 
     /// Stops time from a request until its answer.
-    pub(super) fn begin_work(&self) -> Working {
+    pub(super) fn begin_work(&self) -> WorkGuard {
         self.clock.begin_work()
     }
 

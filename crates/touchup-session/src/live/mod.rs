@@ -76,7 +76,7 @@ pub struct Engine {
 
 /// Final state of an [`Engine`].
 #[derive(Debug)]
-pub struct Ended {
+pub struct FinishedEngine {
     /// the haptic update after the last sample
     pub refiner: Refiner,
     /// all touches; `None` without a patch
@@ -93,7 +93,7 @@ pub enum EngineResult {
     Moved(Box<TriMesh>),
 }
 
-impl Ended {
+impl FinishedEngine {
     /// The scan moved by the haptic update alone.
     pub fn mesh(&self) -> Cow<'_, TriMesh> {
         let moved = self.refiner.mesh();
@@ -537,14 +537,14 @@ impl Engine {
     ///
     /// # Errors
     /// [`LiveError::Stopped`].
-    pub fn finish(mut self) -> Result<Ended, LiveError> {
+    pub fn finish(mut self) -> Result<FinishedEngine, LiveError> {
         self.catch_up()?;
         let patcher = match self.patch {
             Reconstruction::Without => None,
             Reconstruction::AtEnd(patcher) => Some(*patcher),
             Reconstruction::Beside(renewals) => Some(renewals.finish()?),
         };
-        Ok(Ended {
+        Ok(FinishedEngine {
             refiner: self.refiner,
             patcher,
             detail: self.detail,

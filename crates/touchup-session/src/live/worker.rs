@@ -8,7 +8,7 @@ use std::time::Duration;
 use super::error::LiveError;
 use super::gate::Gate;
 use super::probed::{PublishedList, TouchDelta};
-use crate::clock::Working;
+use crate::clock::WorkGuard;
 use crate::threads::give_way;
 use touchup_geometry::mesh::{FaceTree, TriMesh};
 use touchup_method::reconstruct::{PatchDelta, Patcher};
@@ -60,7 +60,7 @@ pub(super) struct PatchedScans {
 #[derive(Debug)]
 pub(super) struct Worker {
     gate: Gate,
-    questions: Sender<(Question, Working)>,
+    questions: Sender<(Question, WorkGuard)>,
     answers: Receiver<WorkerAnswer>,
     thread: JoinHandle<Patcher>,
     batches: Vec<Vec<ContactSample>>,
@@ -69,7 +69,7 @@ pub(super) struct Worker {
 impl Worker {
     #[expect(clippy::too_many_lines)]
     pub fn new(scans: PatchedScans, mut patcher: Patcher, gate: Gate) -> Result<Self, LiveError> {
-        let (questions, inbox) = channel::<(Question, Working)>();
+        let (questions, inbox) = channel::<(Question, WorkGuard)>();
         let (to_engine, answers) = channel();
         let gate_of_thread = gate.clone();
         let work = move || {

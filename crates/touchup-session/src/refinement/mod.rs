@@ -13,7 +13,9 @@ use std::time::Instant;
 use crate::live::{
     Engine, EngineResult, EvidenceReplay, Gate, Latencies, LiveError, Pace, Renewal,
 };
-use crate::replay::{RecordedAs, Recording, ReplayError, Replayed, each_sample, marker_filter};
+use crate::replay::{
+    RecordedAs, Recording, ReplayError, ReplaySummary, each_sample, marker_filter,
+};
 use crate::scan::{Scan, ScanError, read_scan};
 use crate::scene::{CutScan, RegionCut, Scene, SceneError};
 use crate::session::{OutcomeError, RefinedMesh, StrokeChanges, StrokeReplay};
@@ -207,7 +209,7 @@ pub struct RefinementOptions {
 pub struct Refinement {
     input: RefinementInput,
     options: RefinementOptions,
-    stage: Stage,
+    stage: SampleConsumer,
     /// the touchable part of the scan
     region: Option<ScanRegion>,
     watch: InputWatch,
@@ -217,14 +219,14 @@ pub struct Refinement {
     pushes: Latencies,
     accepted: u64,
     refused: BTreeMap<String, u64>,
-    replayed: Replayed,
+    replayed: ReplaySummary,
     /// error before the last sample
     stopped: Option<LiveError>,
 }
 
 /// Consumer of the samples.
 #[derive(Debug)]
-enum Stage {
+enum SampleConsumer {
     /// each sample moves the mesh
     Moving(Box<Engine>),
     /// keeps contacts for the patch at the end, which replaces any haptic update
@@ -285,7 +287,7 @@ impl Refinement {
             engine.keep_strokes();
         }
         Ok(Self {
-            stage: Stage::Moving(engine.into()),
+            stage: SampleConsumer::Moving(engine.into()),
             region,
             watch,
             strokes: options.strokes.replay(),
@@ -294,7 +296,7 @@ impl Refinement {
             pushes: Latencies::new(),
             accepted: 0,
             refused: BTreeMap::new(),
-            replayed: Replayed::default(),
+            replayed: ReplaySummary::default(),
             stopped: None,
             input,
             options,
@@ -309,8 +311,8 @@ impl Refinement {
     /// The current mesh; the scan, if the patch at the end is the only result.
     pub fn mesh(&self) -> &TriMesh {
         match &self.stage {
-            Stage::Moving(engine) => engine.mesh(),
-            Stage::Keeping { .. } => &self.input.scan.0,
+            SampleConsumer::Moving(engine) => engine.mesh(),
+            SampleConsumer::Keeping { .. } => &self.input.scan.0,
         }
     }
 
@@ -322,16 +324,16 @@ impl Refinement {
     /// Counts of all samples.
     pub fn counts(&self) -> &RefineCounts {
         match &self.stage {
-            Stage::Moving(engine) => engine.refiner().counts(),
-            Stage::Keeping { counts, .. } => counts,
+            SampleConsumer::Moving(engine) => engine.refiner().counts(),
+            SampleConsumer::Keeping { counts, .. } => counts,
         }
     }
 
     /// Memory of the moving mesh.
     pub fn footprint(&self) -> Footprint {
         match &self.stage {
-            Stage::Moving(engine) => engine.footprint(),
-            Stage::Keeping { .. } => Footprint::default(),
+            SampleConsumer::Moving(engine) => engine.footprint(),
+            SampleConsumer::Keeping { .. } => Footprint::default(),
         }
     }
 
@@ -394,7 +396,7 @@ impl Refinement {
         let _ = self.take(sample);
         self.pushes.record(started.elapsed());
         match (&mut self.real_time, &self.stage) {
-            (Some(real_time), Stage::Moving(engine)) => {
+            (Some(real_time), SampleConsumer::Moving(engine)) => {
                 real_time.note(sample.stamp_ns, engine.patched_until_ns());
             }
             _ => self.stage.keep_only_evidence(),
@@ -531,7 +533,7 @@ struct EndOfSamples {
     live: Option<LiveSummary>,
 }
 
-impl Stage {
+impl SampleConsumer {
     fn push(
         &mut self,
         sample: &Sample,

@@ -37,7 +37,7 @@ const NOT_A_LOSS: [&str; 4] = ["gap", "no_pose_before", "no_pose_after", "duplic
 
 /// Findings of a replay besides its samples.
 #[derive(Debug, Default)]
-pub struct Replayed {
+pub struct ReplaySummary {
     /// Wrenches of the recording, each a possible sample.
     pub wrenches: u64,
     /// Wrenches without a sample, by reason; reasons of lost poses begin with `pose_`.
@@ -191,8 +191,8 @@ pub fn each_message(
     mut markers: Option<MarkerFilter>,
     at_each: &mut dyn FnMut(),
     mut each: impl FnMut(Message),
-) -> Result<Replayed, ReplayError> {
-    let mut replayed = Replayed::default();
+) -> Result<ReplaySummary, ReplayError> {
+    let mut replayed = ReplaySummary::default();
     let mut has_begun = false;
     while let Some(record) = recording.next() {
         match record {
@@ -238,7 +238,7 @@ pub fn each_sample(
     at_each: &mut dyn FnMut(),
     at_message: &mut dyn FnMut(&Message),
     mut each: impl FnMut(&Sample),
-) -> Result<Replayed, ReplayError> {
+) -> Result<ReplaySummary, ReplayError> {
     let mut sync = Synchroniser::new(sync)?;
     placement.iter().try_for_each(Placement::check)?;
     let wrench_frame = recording.wrench_frame;
@@ -253,7 +253,7 @@ pub fn each_sample(
     Ok(replayed)
 }
 
-impl Replayed {
+impl ReplaySummary {
     /// Adds the counts of the marker filter.
     fn account_markers(&mut self, filter: &MarkerFilter) {
         for (reason, count) in filter

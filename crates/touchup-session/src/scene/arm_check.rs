@@ -141,10 +141,10 @@ impl CheckRecord {
 
     fn parse(text: &str) -> Result<Self, String> {
         #[derive(Deserialize)]
-        struct Versioned {
+        struct RecordVersion {
             version: u32,
         }
-        let Versioned { version } =
+        let RecordVersion { version } =
             serde_json::from_str(text).map_err(|error| error.to_string())?;
         if version != VERSION {
             return Err(format!(

@@ -10,7 +10,7 @@ use touchup_method::haptic::Footprint;
 
 /// Parts by their YAML names, in YAML order, then the features of the program.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Built {
+pub struct SceneParts {
     /// active parts, with their cost
     pub built: Vec<&'static str>,
     /// parts neither allocated nor run
@@ -55,7 +55,7 @@ reported! {
 pub struct SceneCost {
     /// parts
     #[serde(flatten)]
-    pub parts: Built,
+    pub parts: SceneParts,
     /// memory
     #[serde(flatten)]
     pub memory: Memory,
@@ -67,7 +67,7 @@ impl Scene {
     /// - `unused`: parts without use for the task at hand, each with the reason.
     /// - `features`: optional features of the program, and whether this build has them.
     #[expect(clippy::too_many_lines)]
-    pub fn built(&self, unused: &[LeftOut], features: &[(&'static str, bool)]) -> Built {
+    pub fn built(&self, unused: &[LeftOut], features: &[(&'static str, bool)]) -> SceneParts {
         let unless = |is_there: bool, reason| if is_there { None } else { Some(reason) };
         let not_robust = match &self.refine {
             None => Some(NOTHING_MOVES),
@@ -117,7 +117,7 @@ impl Scene {
         let compiled = features
             .iter()
             .map(|&(name, is_there)| (name, unless(is_there, NOT_COMPILED)));
-        let mut built = Built {
+        let mut built = SceneParts {
             built: Vec::new(),
             left_out: Vec::new(),
         };
@@ -136,7 +136,7 @@ impl Scene {
 }
 
 /// Groups inactive parts by reason.
-impl fmt::Display for Built {
+impl fmt::Display for SceneParts {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let list = |names: &[&str]| {
             if names.is_empty() {

@@ -17,7 +17,7 @@ mod template;
 use std::path::{Path, PathBuf};
 
 pub use arm_check::{CheckDoubt, CheckRecord, CheckRecordError, CheckStanding};
-pub use built::{Built, LeftOut, Memory, SceneCost};
+pub use built::{LeftOut, Memory, SceneCost, SceneParts};
 pub use edit::Setting;
 pub(crate) use error::yaml_error;
 pub use error::{SceneError, nearest};

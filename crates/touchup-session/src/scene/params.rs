@@ -17,7 +17,7 @@ use touchup_method::stylus::{
     TipBody, TipShape, Wrench, WrenchFrame,
 };
 use touchup_probing::arm::{ArmGeometry, TouchParams, UrGeometry};
-use touchup_probing::execute::{Cell, ProbeParams, Tool};
+use touchup_probing::execute::{ProbeParams, RobotCell, Tool};
 use touchup_probing::plan::{PatternParams, sigma_of};
 use touchup_sim::ArmParams;
 
@@ -39,7 +39,7 @@ impl Scene {
     }
 
     /// The robot cell and its probing parameters; `None` without `robot`.
-    pub fn probing(&self) -> Option<(Cell, ProbeParams)> {
+    pub fn probing(&self) -> Option<(RobotCell, ProbeParams)> {
         let (
             robot,
             TipParams {
@@ -53,7 +53,7 @@ impl Scene {
             tool,
             ..
         } = robot;
-        let cell = Cell {
+        let cell = RobotCell {
             geometry: match &robot.chain {
                 Some(chain) => ArmGeometry::Chain(chain.clone()),
                 None => UrGeometry::of(robot.model.name())?.into(),
@@ -268,7 +268,7 @@ impl RefineSection {
 }
 
 /// A simulated arm of a cell; other settings are those of [`ArmParams::default`].
-pub fn simulated_arm(cell: &Cell, params: &ProbeParams) -> ArmParams {
+pub fn simulated_arm(cell: &RobotCell, params: &ProbeParams) -> ArmParams {
     ArmParams {
         geometry: cell.geometry.clone(),
         pose_bo: cell.pose_bo,

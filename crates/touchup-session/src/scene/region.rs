@@ -1,7 +1,7 @@
 //! Region of the scan for all touches: the rest gets no adjacency and no tree.
 
 use super::{Scene, SceneError};
-use touchup_geometry::mesh::{Outside, Region, TriMesh};
+use touchup_geometry::mesh::{MeshRemainder, Region, TriMesh};
 use touchup_method::haptic::{RefineParams, RoiSize, ScanRegion};
 use touchup_method::reconstruct::PatcherParams;
 use touchup_method::stylus::WrenchFrame;
@@ -27,7 +27,7 @@ pub struct CutScan {
 #[derive(Clone, Debug, Default)]
 pub struct RegionCut {
     /// the rest of the scan; `None` if the scene names no region
-    pub outside: Option<Outside>,
+    pub outside: Option<MeshRemainder>,
     haptic: Option<ScanRegion>,
     patch: Option<Region>,
 }
@@ -104,7 +104,7 @@ impl Scene {
 impl RegionCut {
     /// Memory of the rest, bytes.
     pub fn bytes(&self) -> usize {
-        self.outside.as_ref().map_or(0, Outside::bytes)
+        self.outside.as_ref().map_or(0, MeshRemainder::bytes)
     }
 
     /// Settings of the haptic update restricted to the region.

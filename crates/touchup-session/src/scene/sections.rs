@@ -9,7 +9,7 @@ use nalgebra::{Isometry3, Point3, Quaternion, UnitQuaternion, Vector3};
 use super::{CheckRecord, CheckRecordError, CheckStanding};
 use touchup_io::mesh_file::MeshUnit;
 use touchup_io::urdf::{ArmLinks, UrdfError, read_urdf};
-use touchup_method::haptic::{Along, ScanParams, SigmoidParams, StepRule, TipParams};
+use touchup_method::haptic::{MotionDirection, ScanParams, SigmoidParams, StepRule, TipParams};
 use touchup_method::parameters;
 use touchup_method::stylus::{
     MarkerBody, MarkerParams, Payload, SensorBias, SensorMount, SettingError, TipShape, TipSizes,
@@ -272,7 +272,7 @@ parameters! {
         step: Option<StepRule> = None, "step" like "lie";
         /// In which direction a face moves: along the normal at the start of the sample (Eq 6), or
         /// along the force.
-        along: Option<Along> = None, "along" like "force";
+        along: Option<MotionDirection> = None, "along" like "force";
         /// Vertices within this distance of the touched face follow it; left out: the radius of the
         /// ball.
         ///

@@ -15,6 +15,6 @@ pub use outcome::{
     origins, sewn,
 };
 pub use outliers::UncertaintySummary;
-pub use record::{SessionError, SessionFacts, SessionRecord, SessionRecorder, Unrecorded};
+pub use record::{RecordingLoss, SessionError, SessionFacts, SessionRecord, SessionRecorder};
 pub use remade::{EvidenceSource, RemakeError};
-pub use strokes::{Exchange, Removal, StrokeChange, StrokeChanges, StrokeHistory, StrokeReplay};
+pub use strokes::{Removal, StrokeChange, StrokeChanges, StrokeHistory, StrokeReplay, UndoStep};

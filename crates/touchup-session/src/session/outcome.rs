@@ -13,14 +13,14 @@ use crate::live::EngineResult;
 use crate::reported;
 use crate::scan::carried_over;
 use touchup_features::features::{Detection, detect};
-use touchup_geometry::mesh::{FaceId, FaceTree, MeshError, Outside, TriMesh, VertexId};
+use touchup_geometry::mesh::{FaceId, FaceTree, MeshError, MeshRemainder, TriMesh, VertexId};
 use touchup_geometry::numeric::counted;
 use touchup_io::features_file::FeatureFile;
 use touchup_io::mesh_file::{MeshFile, MeshFileError, MeshUnit, VertexColumn};
 use touchup_io::mesh_file::{read_mesh, write_mesh_with};
 use touchup_io::result_table::{ResultTableError, write_features_as_named, write_touches_as_named};
 use touchup_io::touches_file::as_written;
-use touchup_method::reconstruct::{Patched, Patcher, Support};
+use touchup_method::reconstruct::{PatchedMesh, Patcher, Support};
 use touchup_method::stylus::ProbedPoint;
 
 /// Error of writing a result.
@@ -79,7 +79,7 @@ pub struct Outcome {
 
 reported! {
     /// The patch in the report.
-    pub struct PatchSummary, pub fn of(patched: &Patched, seconds: f64) {
+    pub struct PatchSummary, pub fn of(patched: &PatchedMesh, seconds: f64) {
         /// maximum distance of the new faces from the surface of the touches
         tolerance_mm: f64 = patched.tolerance * 1e3,
         /// whether the tolerance exceeds the usual one, as the lattice of a large area with a small
@@ -146,11 +146,11 @@ pub fn origins(scan: &TriMesh, refined: &TriMesh) -> Origins {
 /// # Errors
 /// [`MeshError::TornRim`], [`MeshError::TooMany`].
 pub fn sewn(
-    part: Patched,
+    part: PatchedMesh,
     origins: &[Option<Point3<f64>>],
-    outside: &Outside,
+    outside: &MeshRemainder,
     of_scan: f64,
-) -> Result<(Patched, Origins), MeshError> {
+) -> Result<(PatchedMesh, Origins), MeshError> {
     let sewn = outside.sew_to(&part.mesh)?;
     let support = sewn.column(&part.support, Support::Scan);
     let sigma = if part.sigma.is_empty() {
@@ -160,7 +160,7 @@ pub fn sewn(
     };
     let origins = sewn.column(origins, None);
     Ok((
-        Patched {
+        PatchedMesh {
             mesh: sewn.mesh,
             support,
             sigma,
@@ -219,7 +219,7 @@ impl RefinedMesh {
     pub fn of(
         scan: &(TriMesh, FaceTree),
         result: EngineResult,
-        outside: Option<&Outside>,
+        outside: Option<&MeshRemainder>,
         must_change: bool,
     ) -> Result<(Self, Outcome), OutcomeError> {
         match result {
@@ -232,7 +232,7 @@ impl RefinedMesh {
     fn moved(
         scan: &TriMesh,
         refined: TriMesh,
-        outside: Option<&Outside>,
+        outside: Option<&MeshRemainder>,
         must_change: bool,
     ) -> Result<(Self, Outcome), OutcomeError> {
         let moved_faces = moved_faces(scan, &refined);
@@ -268,7 +268,7 @@ impl RefinedMesh {
     fn patched(
         (scan, tree): &(TriMesh, FaceTree),
         mut patcher: Patcher,
-        outside: Option<&Outside>,
+        outside: Option<&MeshRemainder>,
         must_change: bool,
     ) -> Result<(Self, Outcome), OutcomeError> {
         let started = Instant::now();
@@ -307,7 +307,7 @@ impl RefinedMesh {
             uncertainty,
             counts: written_counts(&patched.mesh),
         };
-        let Patched {
+        let PatchedMesh {
             mesh,
             support,
             sigma,

@@ -4,11 +4,11 @@ use std::fmt;
 
 use crate::reported;
 use touchup_geometry::numeric::counted;
-use touchup_method::reconstruct::{Outlier, Outliers, Patched, Support};
+use touchup_method::reconstruct::{Outlier, Outliers, PatchedMesh, Support};
 
 reported! {
     /// Uncertainty in the output of `--json`.
-    pub struct UncertaintySummary, pub fn of(patched: &Patched, found: &Outliers) {
+    pub struct UncertaintySummary, pub fn of(patched: &PatchedMesh, found: &Outliers) {
         /// median standard deviation of the touched vertices
         touched_sigma_mm: f64 = touched_sigma_mm(patched),
         /// contacts of the reconstruction, counted or rejected
@@ -23,7 +23,7 @@ reported! {
     }
 }
 
-fn touched_sigma_mm(patched: &Patched) -> f64 {
+fn touched_sigma_mm(patched: &PatchedMesh) -> f64 {
     let known = patched.sigma.iter().zip(&patched.support);
     let mut touched: Vec<f64> = known
         .filter(|(_, support)| **support == Support::Touched)

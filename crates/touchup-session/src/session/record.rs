@@ -207,7 +207,7 @@ fn parsed<T: DeserializeOwned>(json: &str, path: &Path) -> Result<T, SessionErro
 
 /// Messages missing in the recording of a session.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Unrecorded {
+pub struct RecordingLoss {
     /// number of messages
     pub messages: u64,
     /// the last write error
@@ -222,7 +222,7 @@ pub struct SessionRecorder {
     folder: SessionFolder,
     sender: SyncSender<Note>,
     thread: JoinHandle<()>,
-    unrecorded: Arc<Mutex<Unrecorded>>,
+    unrecorded: Arc<Mutex<RecordingLoss>>,
     end: Arc<RecordingEnd>,
 }
 
@@ -248,7 +248,7 @@ impl SessionRecorder {
             .map_err(io_error(folder.path()))?;
         let writer = SegmentedWriter::new(&recording, topics);
         let (sender, messages) = sync_channel(MOST_WAITING);
-        let unrecorded = Arc::new(Mutex::new(Unrecorded::default()));
+        let unrecorded = Arc::new(Mutex::new(RecordingLoss::default()));
         let end = Arc::new(RecordingEnd::default());
         let taker = Taker {
             writer,
@@ -310,12 +310,12 @@ impl SessionRecorder {
     }
 
     /// Messages missing in the recording.
-    pub fn unrecorded(&self) -> Unrecorded {
+    pub fn unrecorded(&self) -> RecordingLoss {
         locked(&self.unrecorded).clone()
     }
 
     /// Waits for all messages and ends the recording; returns [`Self::unrecorded`].
-    pub fn finish(self) -> Unrecorded {
+    pub fn finish(self) -> RecordingLoss {
         let Self {
             sender,
             thread,
@@ -353,7 +353,7 @@ enum Note {
 
 struct Taker {
     writer: SegmentedWriter,
-    shared: Arc<Mutex<Unrecorded>>,
+    shared: Arc<Mutex<RecordingLoss>>,
     refused_at: Option<Instant>,
     clock: Clock,
     end: Arc<RecordingEnd>,
@@ -527,7 +527,7 @@ mod tests {
                 "look {look}"
             );
         }
-        assert_eq!(recorder.finish(), Unrecorded::default());
+        assert_eq!(recorder.finish(), RecordingLoss::default());
         assert_eq!(on_disk(&folder), written);
     }
 
@@ -542,18 +542,18 @@ mod tests {
         (1..=count + 7).for_each(|number| recorder.write(wrench(number), "tip"));
         assert_eq!(
             recorder.unrecorded(),
-            Unrecorded {
+            RecordingLoss {
                 messages: 7,
-                ..Unrecorded::default()
+                ..RecordingLoss::default()
             }
         );
         hand.advance(FLUSH_EVERY);
         recorder.write(wrench(count + 8), "tip");
         assert_eq!(
             recorder.finish(),
-            Unrecorded {
+            RecordingLoss {
                 messages: 7,
-                ..Unrecorded::default()
+                ..RecordingLoss::default()
             }
         );
         let kept: Vec<_> = (1..=count).chain([count + 8]).map(wrench).collect();

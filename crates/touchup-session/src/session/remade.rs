@@ -6,7 +6,7 @@ use touchup_io::recording::{RecordingError, StampSource, Topics};
 use touchup_method::reconstruct::StrokeSpan;
 use touchup_method::stylus::{Placement, SyncParams};
 
-use super::strokes::{Exchange, StrokeChanges, StrokeReplay};
+use super::strokes::{StrokeChanges, StrokeReplay, UndoStep};
 use crate::live::EvidenceReplay;
 use crate::replay::{Recording, ReplayError, each_sample};
 
@@ -94,7 +94,7 @@ impl EvidenceSource<'_> {
 /// Undoes or redoes strokes before a sample; returns whether they are the strokes of the session.
 fn exchanged(replay: &mut EvidenceReplay, strokes: &mut StrokeReplay, before_ns: i64) -> bool {
     let mut are_same = true;
-    while let Some((Exchange { stroke_ns, .. }, is_undo)) = strokes.next_before(before_ns) {
+    while let Some((UndoStep { stroke_ns, .. }, is_undo)) = strokes.next_before(before_ns) {
         let changed_ns = if is_undo {
             replay.undo()
         } else {

@@ -12,9 +12,9 @@ use touchup_method::reconstruct::StrokeSpan;
 #[serde(tag = "change", rename_all = "snake_case", deny_unknown_fields)]
 pub enum StrokeChange {
     /// undoes the last stroke
-    Undo(Exchange),
+    Undo(UndoStep),
     /// redoes the last undone stroke
-    Redo(Exchange),
+    Redo(UndoStep),
     /// excludes the samples of a stroke, as if they had never come
     TakeOut(Removal),
     /// restores the samples of a stroke, as if never excluded
@@ -33,7 +33,7 @@ impl StrokeChange {
 
 /// Time and stroke of an undo or redo.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Exchange {
+pub struct UndoStep {
     /// stamp of the sample before, ns
     pub after_ns: i64,
     /// touch-down of the stroke, ns; `None` without a patch
@@ -95,7 +95,7 @@ impl StrokeChanges {
     /// never come.
     pub fn replay(&self) -> StrokeReplay {
         let taken_out = self.taken_out();
-        let is_left = |exchange: &Exchange| {
+        let is_left = |exchange: &UndoStep| {
             let is_out = |stroke_ns| taken_out.iter().any(|span| span.contains(stroke_ns));
             !exchange.stroke_ns.is_some_and(is_out)
         };
@@ -124,7 +124,7 @@ impl StrokeChanges {
 #[derive(Clone, Debug)]
 pub struct StrokeReplay {
     taken_out: Vec<StrokeSpan>,
-    exchanges: Peekable<IntoIter<(Exchange, bool)>>,
+    exchanges: Peekable<IntoIter<(UndoStep, bool)>>,
 }
 
 impl StrokeReplay {
@@ -135,7 +135,7 @@ impl StrokeReplay {
 
     /// The next undo (true) or redo (false) before the sample of this stamp; skips excluded
     /// strokes.
-    pub fn next_before(&mut self, stamp_ns: i64) -> Option<(Exchange, bool)> {
+    pub fn next_before(&mut self, stamp_ns: i64) -> Option<(UndoStep, bool)> {
         self.exchanges
             .next_if(|(exchange, _)| exchange.after_ns < stamp_ns)
     }
@@ -189,8 +189,8 @@ mod tests {
         }
     }
 
-    fn exchange(after_ns: i64, stroke_ns: i64) -> Exchange {
-        Exchange {
+    fn exchange(after_ns: i64, stroke_ns: i64) -> UndoStep {
+        UndoStep {
             after_ns,
             stroke_ns: Some(stroke_ns),
         }

@@ -321,7 +321,7 @@ fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<(), SweepErr
 
 /// State of a job from the folder of its result.
 fn report(job: &Job, result: PathBuf, was_there: bool) -> Result<JobReport, SweepError> {
-    let ResultFiles { failed, summary } = ResultFiles::of_job(job, &result)?;
+    let JobOutcome { failed, summary } = JobOutcome::of_job(job, &result)?;
     Ok(JobReport {
         job: job.job,
         id: job.id.clone(),
@@ -343,12 +343,12 @@ fn sums_of(result: &Path) -> Result<Vec<String>, FileError> {
 }
 
 /// Summary or failure of a job.
-pub(super) struct ResultFiles {
+pub(super) struct JobOutcome {
     pub failed: Option<String>,
     pub summary: Value,
 }
 
-impl ResultFiles {
+impl JobOutcome {
     /// Files of a job, whose folder may have changed.
     ///
     /// # Errors

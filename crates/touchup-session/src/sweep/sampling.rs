@@ -13,7 +13,7 @@ pub(super) type KeySetting = BTreeMap<String, Value>;
 /// Division of a range.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub(super) enum Scale {
+pub(super) enum RangeDivision {
     /// equal differences
     #[default]
     Linear,
@@ -31,7 +31,7 @@ pub(super) enum KeyValues {
         from: f64,
         to: f64,
         steps: Option<u32>,
-        scale: Scale,
+        scale: RangeDivision,
     },
 }
 
@@ -42,7 +42,7 @@ struct WrittenRange {
     to: f64,
     steps: Option<u32>,
     #[serde(default)]
-    scale: Scale,
+    scale: RangeDivision,
 }
 
 /// Selection of settings.
@@ -95,7 +95,7 @@ impl KeyValues {
                 if !(from.is_finite() && to.is_finite()) {
                     return Err("from and to must be finite numbers".to_owned());
                 }
-                if scale == Scale::Log && !is_positive {
+                if scale == RangeDivision::Log && !is_positive {
                     return Err(format!(
                         "from {from} and to {to} must be above 0 on a scale of log"
                     ));
@@ -145,13 +145,13 @@ impl KeyValues {
             Self::Range {
                 from,
                 to,
-                scale: Scale::Linear,
+                scale: RangeDivision::Linear,
                 ..
             } => number(from + (to - from) * share),
             Self::Range {
                 from,
                 to,
-                scale: Scale::Log,
+                scale: RangeDivision::Log,
                 ..
             } => number(from * (to / from).powf(share)),
         }

@@ -6,7 +6,7 @@ use serde_json::{Map, Value};
 
 use super::error::SweepError;
 use super::job::{Job, JobsFile};
-use super::run::{FEATURES, ResultFiles};
+use super::run::{FEATURES, JobOutcome};
 use touchup_io::features_file::read_features;
 use touchup_io::result_table::ResultTable;
 
@@ -52,7 +52,7 @@ pub fn tables_of(
             }
             continue;
         }
-        let ResultFiles { failed, summary } = match ResultFiles::of_job(&job, &result) {
+        let JobOutcome { failed, summary } = match JobOutcome::of_job(&job, &result) {
             Err(damaged) => {
                 tables.damaged.push(damaged.to_string());
                 continue;

@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use super::error::SweepError;
 use super::record::{JobRecord, read_record};
-use super::run::{FEATURES, MESH, ResultFiles};
+use super::run::{FEATURES, JobOutcome, MESH};
 use crate::threads::Threads;
 use touchup_features::compare::{
     CompareError, DisplacedFrom, Displacement, IndexedMesh, angle_between, displacements_by_vertex,
@@ -72,7 +72,7 @@ impl JobResult {
     /// [`WhatIfError`] for a missing or failed result.
     pub fn read(folder: &Path) -> Result<Self, WhatIfError> {
         let record = read_record(folder)?;
-        if let Some(why) = ResultFiles::read(folder)?.failed {
+        if let Some(why) = JobOutcome::read(folder)?.failed {
             return Err(WhatIfError::Failed {
                 path: folder.to_owned(),
                 why,

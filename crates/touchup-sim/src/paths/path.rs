@@ -37,7 +37,7 @@ pub struct RasterRegion {
 
 /// Direction of the lines of a raster.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Lines {
+pub enum RasterDirection {
     /// along x of the region's frame
     AlongX,
     /// along y
@@ -117,12 +117,12 @@ pub(crate) fn free(points: Vec<Point3<f64>>) -> Stroke {
 /// [`SimError::BadParameter`], also for more than 100,000 lines.
 pub fn raster(
     region: &RasterRegion,
-    lines: Lines,
+    lines: RasterDirection,
     params: &PathParams,
 ) -> Result<Vec<Stroke>, SimError> {
     params.check()?;
     let size = region.high - region.low;
-    let (length, width) = if lines == Lines::AlongX {
+    let (length, width) = if lines == RasterDirection::AlongX {
         (size.x, size.y)
     } else {
         (size.y, size.x)
@@ -144,7 +144,7 @@ pub fn raster(
             width * i as f64 / count as f64,
         );
         region.low
-            + if lines == Lines::AlongX {
+            + if lines == RasterDirection::AlongX {
                 Vector2::new(s, t)
             } else {
                 Vector2::new(t, s)
@@ -240,18 +240,18 @@ pub fn plan_demo(plate: &Plate, params: &PathParams) -> Result<Vec<Stroke>, SimE
         clear,
     };
     let features = region([0.009, 0.008], [0.055, 0.042]);
-    let mut strokes = raster(&features, Lines::AlongX, params)?;
-    strokes.extend(raster(&features, Lines::AlongY, params)?);
+    let mut strokes = raster(&features, RasterDirection::AlongX, params)?;
+    strokes.extend(raster(&features, RasterDirection::AlongY, params)?);
     let step = plate.step_x;
     // across the edge in close lines, then along both of its sides
     strokes.extend(raster(
         &region([step - 4e-3, 0.010], [step + 5e-3, 0.036]),
-        Lines::AlongX,
+        RasterDirection::AlongX,
         params,
     )?);
     strokes.extend(raster(
         &region([step - 1e-3, 0.010], [step + 2e-3, 0.036]),
-        Lines::AlongY,
+        RasterDirection::AlongY,
         params,
     )?);
     strokes.extend(plan_walls(plate, params)?);
@@ -312,8 +312,8 @@ pub fn plan_mesh(
         pitch: params.pitch.max(needed),
         ..*params
     };
-    let mut strokes = raster(&region, Lines::AlongX, &params)?;
-    strokes.extend(raster(&region, Lines::AlongY, &params)?);
+    let mut strokes = raster(&region, RasterDirection::AlongX, &params)?;
+    strokes.extend(raster(&region, RasterDirection::AlongY, &params)?);
     for stroke in strokes.iter_mut().filter(|stroke| stroke.press.is_some()) {
         stroke.points = follow_heights(surface, &region, &stroke.points, &params);
     }

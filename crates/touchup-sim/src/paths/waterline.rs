@@ -35,7 +35,7 @@ const OVERLAP: f64 = 0.08;
 
 /// A closed line of the ball's centre at one height.
 #[derive(Clone, Debug)]
-struct Loop {
+struct Waterline {
     /// number of the height
     height: usize,
     /// x and y in V, m
@@ -48,7 +48,7 @@ struct Loop {
     middle: Point2<f64>,
 }
 
-impl Loop {
+impl Waterline {
     fn is_like(&self, other: &Self) -> bool {
         (self.middle - other.middle).norm() < SAME_MIDDLE
             && (self.length - other.length).abs() < SAME_LENGTH * self.length
@@ -91,7 +91,7 @@ pub fn plan_waterlines(
     let heights = ((region.clear - region.floor) / step).floor() as usize;
     let mut grid = Grid::new(surface, &region, params.radius);
     let at = |height: usize| region.clear - height as f64 * step;
-    let loops: Vec<Vec<Loop>> = (0..=heights)
+    let loops: Vec<Vec<Waterline>> = (0..=heights)
         .map(|height| grid.loops(height, at(height), params))
         .collect();
     let kept = within(&loops, step, params);
@@ -103,10 +103,10 @@ pub fn plan_waterlines(
 
 /// The loops for [`PathParams::longest`]: no closer than the pitch, wider apart if that takes too
 /// long; without the longest ones if even the last of each kind alone take too long.
-fn within<'a>(loops: &'a [Vec<Loop>], step: f64, params: &PathParams) -> Vec<&'a Loop> {
-    let time = |run: &Loop| run.length * (1.0 + OVERLAP) / params.wall_speed;
+fn within<'a>(loops: &'a [Vec<Waterline>], step: f64, params: &PathParams) -> Vec<&'a Waterline> {
+    let time = |run: &Waterline| run.length * (1.0 + OVERLAP) / params.wall_speed;
     let is_short =
-        |kept: &Vec<&Loop>| kept.iter().map(|run| time(run)).sum::<f64>() <= params.longest;
+        |kept: &Vec<&Waterline>| kept.iter().map(|run| time(run)).sum::<f64>() <= params.longest;
     let widths = (0..TRIES).map(|at| params.pitch * WIDER.powi(at));
     let mut kept = Vec::new();
     for pitch in widths {
@@ -131,8 +131,8 @@ fn within<'a>(loops: &'a [Vec<Loop>], step: f64, params: &PathParams) -> Vec<&'a
 }
 
 /// The loops at least `every` heights below a similar one, and the last of each kind.
-fn thinned(loops: &[Vec<Loop>], every: f64) -> Vec<&Loop> {
-    let mut kept: Vec<&Loop> = Vec::new();
+fn thinned(loops: &[Vec<Waterline>], every: f64) -> Vec<&Waterline> {
+    let mut kept: Vec<&Waterline> = Vec::new();
     for (height, at_height) in loops.iter().enumerate() {
         for run in at_height {
             let every = every * if run.is_outer { OUTER_SPARSER } else { 1.0 };
@@ -156,7 +156,7 @@ fn thinned(loops: &[Vec<Loop>], every: f64) -> Vec<&Loop> {
 }
 
 /// Down to a loop, around it, and up again.
-fn strokes(run: &Loop, region: &RasterRegion, z: f64, params: &PathParams) -> [Stroke; 3] {
+fn strokes(run: &Waterline, region: &RasterRegion, z: f64, params: &PathParams) -> [Stroke; 3] {
     let above = region.at(run.entry, region.clear);
     let entry = region.at(run.entry, z);
     let mut line: Vec<Point3<f64>> = run.points.iter().map(|&q| region.at(q, z)).collect();
@@ -214,14 +214,14 @@ impl<'a> Grid<'a> {
     }
 
     /// The outlines of the ball's free region at one height.
-    fn loops(&mut self, height: usize, z: f64, params: &PathParams) -> Vec<Loop> {
+    fn loops(&mut self, height: usize, z: f64, params: &PathParams) -> Vec<Waterline> {
         let level = params.radius - params.lean;
         let values: Vec<f64> = (0..self.reached.len())
             .map(|node| self.distance(node, z, level) - level)
             .collect();
         let part = self.reachable(&values, z, params.lean);
         let next = self.segments(&values, &part);
-        let mut loops: Vec<Loop> = closed(&next)
+        let mut loops: Vec<Waterline> = closed(&next)
             .into_iter()
             .filter_map(|nodes| {
                 let place = |&[inner, outer]: &[usize; 2]| {
@@ -308,7 +308,7 @@ impl<'a> Grid<'a> {
         mut points: Vec<Point2<f64>>,
         number: u32,
         part: &[u32],
-    ) -> Option<Loop> {
+    ) -> Option<Waterline> {
         let is_entry = |&node: &usize| part[node] == number && self.reached[node] <= z;
         let far = |node: usize, p: &Point2<f64>| (self.at(node) - p).norm_squared();
         let first = *points.first()?;
@@ -329,7 +329,7 @@ impl<'a> Grid<'a> {
             .iter()
             .fold(nalgebra::Vector2::zeros(), |sum, p| sum + p.coords);
         let middle = (sum / points.len() as f64).into();
-        Some(Loop {
+        Some(Waterline {
             height,
             points,
             entry,

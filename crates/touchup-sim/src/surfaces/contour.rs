@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Point3, Vector3};
 
-use super::field::{Field, cells};
+use super::field::{GridField, cells};
 use touchup_geometry::mesh::triangle::intersect;
 use touchup_geometry::mesh::{BoxQuery, FaceId, FaceTree, MeshError, TriMesh};
 
@@ -29,7 +29,7 @@ pub(crate) struct MeshDraft {
 
 /// The zero level of `field` by surface nets with cells of `side` (m): every cell that the level
 /// passes gets a vertex, every lattice edge that crosses it two triangles [Gibson 1998].
-pub(crate) fn contour(field: &Field, side: f64) -> MeshDraft {
+pub(crate) fn contour(field: &GridField, side: f64) -> MeshDraft {
     let count = field
         .nodes
         .map(|n| ((n - 1) as f64 * field.pitch / side).floor() as usize);
@@ -90,7 +90,7 @@ pub(crate) fn contour(field: &Field, side: f64) -> MeshDraft {
 }
 
 /// The point moved along the gradient to the field's zero level, at most half a cell at a time.
-fn on_level(field: &Field, mut p: Point3<f64>, side: f64) -> Point3<f64> {
+fn on_level(field: &GridField, mut p: Point3<f64>, side: f64) -> Point3<f64> {
     for _ in 0..RETURN_STEPS {
         let gradient = field.gradient(&p);
         // a flat field (clamped far from the surface) gives no direction
@@ -103,7 +103,7 @@ fn on_level(field: &Field, mut p: Point3<f64>, side: f64) -> Point3<f64> {
 impl MeshDraft {
     /// Turns the lattice's triangles into nearly equilateral ones with all vertices on the field's
     /// zero level.
-    pub(crate) fn even_out_mut(&mut self, field: &Field, side: f64) {
+    pub(crate) fn even_out_mut(&mut self, field: &GridField, side: f64) {
         for _ in 0..ROUNDS {
             let stars = self.stars();
             for (v, star) in stars.iter().enumerate() {
@@ -115,7 +115,7 @@ impl MeshDraft {
 
     /// Moves a vertex onto the level, and along it towards the middle of its neighbours if no face
     /// turns over.
-    fn relax_mut(&mut self, vertex: u32, star: &[usize], field: &Field, side: f64) {
+    fn relax_mut(&mut self, vertex: u32, star: &[usize], field: &GridField, side: f64) {
         let old = on_level(field, self.positions[vertex as usize], side);
         self.positions[vertex as usize] = old;
         let corners = star
@@ -258,7 +258,7 @@ impl MeshDraft {
     }
 
     /// Drops faces that turn their back on the field's gradient: folds.
-    pub(crate) fn drop_folds_mut(&mut self, field: &Field) {
+    pub(crate) fn drop_folds_mut(&mut self, field: &GridField) {
         let upright = |face: &[u32; 3]| {
             let middle = face
                 .iter()

@@ -9,7 +9,7 @@ const BLOCK: usize = 4;
 
 /// Values at the nodes of a grid in a frame V; x runs fastest.
 #[derive(Clone, Debug)]
-pub(crate) struct Field {
+pub(crate) struct GridField {
     pub(crate) nodes: [usize; 3],
     /// first node, m, in V
     pub(crate) origin: Point3<f64>,
@@ -18,7 +18,7 @@ pub(crate) struct Field {
     values: Vec<f64>,
 }
 
-impl Field {
+impl GridField {
     /// The signed distance, clamped to ± `band` (m), on a grid from `low` to `high` (m, in V).
     pub(crate) fn of_surface(
         surface: &dyn Surface,
@@ -252,7 +252,7 @@ mod tests {
 
     /// Closing by its definition: the smallest, then the largest over all nodes of the layer within
     /// the radius.
-    fn closed(field: &Field, radius: f64) -> Vec<f64> {
+    fn closed(field: &GridField, radius: f64) -> Vec<f64> {
         let over_disc = |values: &[f64], worst: f64, pick: fn(f64, f64) -> f64| -> Vec<f64> {
             let near = |[i, j, k]: [usize; 3], [a, b, c]: [usize; 3]| {
                 let far = (a.abs_diff(i).pow(2) + b.abs_diff(j).pow(2)) as f64;
@@ -275,7 +275,7 @@ mod tests {
         // no pattern: the fractional parts of multiples of the golden ratio
         let values = (0..nodes.iter().product())
             .map(|i: usize| (i as f64 * 0.618_033_988_749_895).fract() - 0.5);
-        let field = Field {
+        let field = GridField {
             nodes,
             origin: Point3::origin(),
             pitch: 0.5,

@@ -8,7 +8,7 @@
 use nalgebra::{Point2, Point3, Vector2, Vector3};
 
 use super::surface::{Bounds, Surface, SurfacePoint};
-use touchup_features::features::{InspectedQuantity, Kind};
+use touchup_features::features::{FeatureKind, InspectedQuantity};
 
 /// All points within `radius` of a segment; a disc when the segment has no length.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -122,12 +122,12 @@ pub struct TruthFeature {
 
 impl TruthFeature {
     /// The kind that it is found as.
-    pub fn kind(&self) -> Kind {
+    pub fn kind(&self) -> FeatureKind {
         match self.shape {
-            TruthShape::Hole { .. } => Kind::Hole,
-            TruthShape::Slot { .. } => Kind::Slot,
-            TruthShape::Boss { .. } => Kind::Boss,
-            TruthShape::Step { .. } => Kind::Edge,
+            TruthShape::Hole { .. } => FeatureKind::Hole,
+            TruthShape::Slot { .. } => FeatureKind::Slot,
+            TruthShape::Boss { .. } => FeatureKind::Boss,
+            TruthShape::Step { .. } => FeatureKind::Edge,
         }
     }
 

@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 use rand_pcg::Pcg64;
-use touchup::features::{Feature, Kind};
+use touchup::features::{Feature, FeatureKind};
 use touchup::io::mesh_file::MeshUnit::{self, Inch, Metre, Millimetre};
 use touchup::io::mesh_file::read_mesh;
 use touchup::mesh::TriMesh;
@@ -21,7 +21,7 @@ const PARTS: [(&str, MeshUnit, usize); 4] = [
 /// Diameter, depth (m), through, and cone angle of each hole, with its centre: in an order of their
 /// own.
 fn holes(features: &[Feature]) -> Vec<(Point3<f64>, [f64; 3], Option<bool>)> {
-    let value = |number: &Option<touchup::features::Measured<f64>>| {
+    let value = |number: &Option<touchup::features::MeasuredValue<f64>>| {
         number.as_ref().map_or(0.0, |number| number.value)
     };
     let row = |f: &&Feature| {
@@ -31,7 +31,10 @@ fn holes(features: &[Feature]) -> Vec<(Point3<f64>, [f64; 3], Option<bool>)> {
             f.through,
         )
     };
-    of_kind(features, Kind::Hole).iter().map(row).collect()
+    of_kind(features, FeatureKind::Hole)
+        .iter()
+        .map(row)
+        .collect()
 }
 
 /// Whether both have the same holes, within `limit` (m, rad).

@@ -6,7 +6,7 @@
 //! corners that bound each round patch, heights of those corners. Of closed parts the genus is the
 //! number of through-openings; it was computed too and agrees.
 
-use touchup::features::Kind;
+use touchup::features::FeatureKind;
 use touchup::io::mesh_file::MeshUnit::{Inch, Metre, Millimetre};
 
 use crate::features::detection::expected::{Round, blind, check_holes, countersunk, step, through};
@@ -60,7 +60,10 @@ fn featuretype_has_a_ring_groove_of_four_arms_and_two_pockets() {
         ([-25.9395, 0.0, 34.925], 13.573, 16.818, 5.08),
         ([38.1, 0.0, 25.4], 12.7, 12.7, 3.175),
     ];
-    for (kind, expected) in [(Kind::Slot, &slots[..]), (Kind::Pocket, &pockets[..])] {
+    for (kind, expected) in [
+        (FeatureKind::Slot, &slots[..]),
+        (FeatureKind::Pocket, &pockets[..]),
+    ] {
         let all = of_kind(&features, kind);
         assert_eq!(all.len(), expected.len(), "{kind:?}");
         for (centre, width, length, depth) in expected {
@@ -81,7 +84,11 @@ fn featuretype_has_a_ring_groove_of_four_arms_and_two_pockets() {
             assert_eq!(one.through, Some(false));
         }
     }
-    assert_eq!(of_kind(&features, Kind::Boss).len(), 0, "the pad is square");
+    assert_eq!(
+        of_kind(&features, FeatureKind::Boss).len(),
+        0,
+        "the pad is square"
+    );
 }
 
 /// From above: four countersunk holes and one counterbored in the middle. Genus 5. The cones go
@@ -125,7 +132,7 @@ fn idler_riser_has_a_bore_and_two_screw_holes() {
     let features = found(&mesh);
     check_holes(&features, &expected, &[]);
     // the collar around the bore
-    let bosses = of_kind(&features, Kind::Boss);
+    let bosses = of_kind(&features, FeatureKind::Boss);
     assert_eq!(bosses.len(), 1);
     assert!(
         (bosses[0].diameter.as_ref().unwrap().value - 50.8e-3).abs() < 1e-6,
@@ -323,10 +330,10 @@ fn mold_has_21_blind_and_four_counterbored_holes() {
         return;
     };
     let features = found(&mesh);
-    let holes = of_kind(&features, Kind::Hole);
+    let holes = of_kind(&features, FeatureKind::Hole);
     let count = |diameter: f64, is_through: bool, depth: f64| {
         let is_it = |hole: &&&touchup::features::Feature| {
-            let size = |size: &Option<touchup::features::Measured<f64>>| {
+            let size = |size: &Option<touchup::features::MeasuredValue<f64>>| {
                 size.as_ref().unwrap().value * 1e3
             };
             (size(&hole.diameter) - diameter).abs() < 2e-3
@@ -358,5 +365,5 @@ fn octagonal_pocket_has_one_hole_and_no_slot() {
         &[through(38.1, [203.2, 25.4, 0.0], DOWN, 15.875)],
         &[],
     );
-    assert_eq!(of_kind(&features, Kind::Slot).len(), 0);
+    assert_eq!(of_kind(&features, FeatureKind::Slot).len(), 0);
 }

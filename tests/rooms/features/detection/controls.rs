@@ -3,7 +3,7 @@
 use nalgebra::{Point3, Vector3};
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
-use touchup::features::{Feature, Kind};
+use touchup::features::{Feature, FeatureKind};
 use touchup::io::mesh_file::MeshUnit::{Metre, Millimetre};
 use touchup::mesh::TriMesh;
 
@@ -13,10 +13,15 @@ use crate::shapes::{icosphere, torus};
 
 /// Holes, slots, pockets and bosses together.
 fn cut_or_raised(features: &[Feature]) -> usize {
-    [Kind::Hole, Kind::Slot, Kind::Pocket, Kind::Boss]
-        .map(|kind| of_kind(features, kind).len())
-        .iter()
-        .sum()
+    [
+        FeatureKind::Hole,
+        FeatureKind::Slot,
+        FeatureKind::Pocket,
+        FeatureKind::Boss,
+    ]
+    .map(|kind| of_kind(features, kind).len())
+    .iter()
+    .sum()
 }
 
 /// Rendered from six sides: sharp and smooth edges without an opening, genus 0; a panel with
@@ -53,15 +58,16 @@ fn cube(edge: f64) -> TriMesh {
 #[test]
 fn a_cube_has_its_planes_edges_and_corners_alone() {
     let features = found(&cube(0.04));
-    let counts = [Kind::Plane, Kind::Edge, Kind::Corner].map(|kind| of_kind(&features, kind).len());
+    let counts = [FeatureKind::Plane, FeatureKind::Edge, FeatureKind::Corner]
+        .map(|kind| of_kind(&features, kind).len());
     assert_eq!((counts, features.len()), ([6, 12, 8], 26));
     assert!(
-        of_kind(&features, Kind::Edge)
+        of_kind(&features, FeatureKind::Edge)
             .iter()
             .all(|edge| edge.is_convex == Some(true))
     );
     assert!(
-        of_kind(&features, Kind::Edge)
+        of_kind(&features, FeatureKind::Edge)
             .iter()
             .all(|edge| (edge.length.as_ref().unwrap().value - 0.04).abs() < 1e-9)
     );
@@ -71,7 +77,7 @@ fn a_cube_has_its_planes_edges_and_corners_alone() {
 fn a_flat_square_is_one_plane() {
     let features = found(&grid(20, 2e-3, |_, _| 0.0));
     assert_eq!(features.len(), 1);
-    assert_eq!(features[0].kind, Kind::Plane);
+    assert_eq!(features[0].kind, FeatureKind::Plane);
 }
 
 #[test]
@@ -125,7 +131,7 @@ fn next_to_nothing_is_no_reason_to_fall() {
     assert!(
         found(&mesh_of(&[[p(0.0, 0.0), p(1.0, 0.0), p(0.0, 1.0)]]))
             .iter()
-            .all(|f| f.kind == Kind::Plane)
+            .all(|f| f.kind == FeatureKind::Plane)
     );
     // without area, and with an edge of three faces
     let flat = TriMesh::new(vec![p(0.0, 0.0), p(1.0, 0.0), p(2.0, 0.0)], vec![[0, 1, 2]]).unwrap();

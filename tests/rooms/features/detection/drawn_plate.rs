@@ -2,14 +2,14 @@
 //! which the edge is broken. Sizes and places are those they are made from.
 
 use nalgebra::Point3;
-use touchup::features::{Feature, Kind};
+use touchup::features::{Feature, FeatureKind};
 use touchup::sim::{Plate, TruthShape};
 
 use crate::features::detection::{found, of_kind};
 use crate::shapes::revolved;
 
 /// (depth, width, length or diameter) of the one feature at a place, mm.
-fn sizes(features: &[Feature], kind: Kind, at: &Point3<f64>) -> Vec<f64> {
+fn sizes(features: &[Feature], kind: FeatureKind, at: &Point3<f64>) -> Vec<f64> {
     let near = |feature: &&&Feature| (feature.centre.value - at).norm() < 1e-5;
     let features = of_kind(features, kind);
     let all: Vec<_> = features.iter().filter(near).collect();
@@ -32,8 +32,13 @@ fn sizes(features: &[Feature], kind: Kind, at: &Point3<f64>) -> Vec<f64> {
 fn everything_on_the_plate_is_found_however_finely_it_is_divided() {
     for chord in [50e-6, 10e-6, 2e-6] {
         let features = found(&Plate::default().mesh(chord).unwrap());
-        let counts = [Kind::Hole, Kind::Slot, Kind::Pocket, Kind::Boss]
-            .map(|kind| of_kind(&features, kind).len());
+        let counts = [
+            FeatureKind::Hole,
+            FeatureKind::Slot,
+            FeatureKind::Pocket,
+            FeatureKind::Boss,
+        ]
+        .map(|kind| of_kind(&features, kind).len());
         assert_eq!(counts, [2, 1, 0, 1], "chord {chord}");
         for truth in Plate::default().features() {
             let (kind, expected) = match truth.shape {
@@ -41,14 +46,16 @@ fn everything_on_the_plate_is_found_however_finely_it_is_divided() {
                 TruthShape::Hole { through: true, .. } | TruthShape::Step { .. } => continue,
                 TruthShape::Hole {
                     diameter, depth, ..
-                } => (Kind::Hole, vec![diameter, depth]),
-                TruthShape::Boss { diameter, height } => (Kind::Boss, vec![diameter, height]),
+                } => (FeatureKind::Hole, vec![diameter, depth]),
+                TruthShape::Boss { diameter, height } => {
+                    (FeatureKind::Boss, vec![diameter, height])
+                }
                 TruthShape::Slot {
                     width,
                     length,
                     depth,
                     ..
-                } => (Kind::Slot, vec![depth, width, length]),
+                } => (FeatureKind::Slot, vec![depth, width, length]),
             };
             let measured = sizes(&features, kind, &truth.centre);
             let off = measured
@@ -84,10 +91,11 @@ fn a_hole_with_a_broken_edge_is_as_deep_as_from_its_plane() {
         outline.extend([(r, -depth), (0.0, -depth - tip)]);
         outline.dedup();
         let features = found(&revolved(&outline, 128));
-        let holes = of_kind(&features, Kind::Hole);
+        let holes = of_kind(&features, FeatureKind::Hole);
         assert_eq!(holes.len(), 1, "broken by {broken}");
         let hole = holes[0];
-        let value = |size: &Option<touchup::features::Measured<f64>>| size.as_ref().unwrap().value;
+        let value =
+            |size: &Option<touchup::features::MeasuredValue<f64>>| size.as_ref().unwrap().value;
         assert!(
             (value(&hole.depth) - depth).abs() < 1e-6,
             "broken by {broken}: {:?}",

@@ -1,7 +1,7 @@
 //! Holes that are expected, and how they are compared with those found.
 
 use nalgebra::{Point3, Vector3};
-use touchup::features::{Feature, FittedTo, Kind};
+use touchup::features::{Feature, FeatureKind, FittedTo};
 
 use crate::features::detection::of_kind;
 
@@ -127,7 +127,7 @@ impl Round {
 ///
 /// - `steps`: pairs of numbers in `expected` that are of one group; all others are of none.
 pub fn check_holes(features: &[Feature], expected: &[Round], steps: &[[usize; 2]]) {
-    let holes = of_kind(features, Kind::Hole);
+    let holes = of_kind(features, FeatureKind::Hole);
     let place = |one: &Round| {
         let at: Vec<usize> = (0..holes.len()).filter(|&i| one.is_at(holes[i])).collect();
         assert_eq!(at.len(), 1, "{one:?} is found {} times", at.len());

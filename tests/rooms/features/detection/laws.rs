@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Isometry3, Point3, Rotation3, Vector3};
 use proptest::prelude::*;
-use touchup::features::{Feature, Kind};
+use touchup::features::{Feature, FeatureKind};
 use touchup::io::mesh_file::MeshUnit::{self, Inch, Metre, Millimetre};
 use touchup::mesh::TriMesh;
 
@@ -61,7 +61,12 @@ fn is_image(
 fn holes_slots_pockets(features: &[Feature]) -> Vec<&Feature> {
     features
         .iter()
-        .filter(|f| matches!(f.kind, Kind::Hole | Kind::Slot | Kind::Pocket | Kind::Boss))
+        .filter(|f| {
+            matches!(
+                f.kind,
+                FeatureKind::Hole | FeatureKind::Slot | FeatureKind::Pocket | FeatureKind::Boss
+            )
+        })
         .collect()
 }
 

@@ -10,7 +10,7 @@ mod laws;
 mod sheets;
 
 use nalgebra::Point3;
-use touchup::features::{Feature, Kind, detect};
+use touchup::features::{Feature, FeatureKind, detect};
 use touchup::io::mesh_file::{MeshUnit, read_mesh};
 use touchup::mesh::{TriMesh, repair};
 
@@ -29,7 +29,7 @@ fn found(mesh: &TriMesh) -> Vec<Feature> {
     detect(mesh, &[]).features
 }
 
-fn of_kind(features: &[Feature], kind: Kind) -> Vec<&Feature> {
+fn of_kind(features: &[Feature], kind: FeatureKind) -> Vec<&Feature> {
     features
         .iter()
         .filter(|feature| feature.kind == kind)

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Point3, Vector3};
 use rand_pcg::Pcg64;
-use touchup::features::{Feature, Kind};
+use touchup::features::{Feature, FeatureKind};
 use touchup::io::mesh_file::MeshUnit::{Metre, Millimetre};
 use touchup::io::mesh_file::read_mesh;
 use touchup::mesh::TriMesh;
@@ -34,7 +34,7 @@ fn rings(outline: &[[f64; 2]], sides: u32) -> TriMesh {
 }
 
 fn holes(mesh: &TriMesh) -> Vec<Feature> {
-    of_kind(&found(mesh), Kind::Hole)
+    of_kind(&found(mesh), FeatureKind::Hole)
         .into_iter()
         .cloned()
         .collect()

@@ -2,7 +2,7 @@
 
 use nalgebra::{UnitQuaternion, Vector3};
 use proptest::prelude::*;
-use touchup::features::fit::{Cone, FitParams, Freedom, Surface, fit};
+use touchup::features::fit::{Cone, FitParams, Freedom, SurfaceModel, fit};
 
 use super::*;
 

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use touchup::features::fit::{Cone, Fit, FitParams, Freedom, Plane, Surface, fit};
+use touchup::features::fit::{Cone, Fit, FitParams, Freedom, Plane, SurfaceModel, fit};
 
 use super::*;
 

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use touchup::features::fit::{FitParams, Freedom, Surface, fit};
+use touchup::features::fit::{FitParams, Freedom, SurfaceModel, fit};
 
 use super::*;
 

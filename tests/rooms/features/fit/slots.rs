@@ -1,6 +1,6 @@
 //! Slots touched all around, and in part.
 
-use touchup::features::fit::{Ends, Fit, FitParams, Freedom, Stadium, Surface, fit};
+use touchup::features::fit::{Ends, Fit, FitParams, Freedom, Stadium, SurfaceModel, fit};
 
 use super::*;
 

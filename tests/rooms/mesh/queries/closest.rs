@@ -3,7 +3,7 @@
 
 use super::*;
 use nalgebra::Isometry3;
-use touchup::mesh::{BoxQuery, FaceHit, Nearby};
+use touchup::mesh::{BoxQuery, FaceHit, NearbyLeaves};
 
 fn brute_distance(mesh: &TriMesh, p: &Point3<f64>) -> f64 {
     mesh.faces()
@@ -452,7 +452,7 @@ fn a_corner_of_a_needle_is_found_from_its_own_face() {
                 &corner,
                 FaceId(0),
                 f64::INFINITY,
-                &mut Nearby::default(),
+                &mut NearbyLeaves::default(),
             );
             assert_eq!(
                 hit.map(|hit| hit.distance_squared),

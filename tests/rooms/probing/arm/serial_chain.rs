@@ -7,8 +7,8 @@ use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use touchup::probing::arm::{
-    ArmBodies, ArmGeometry, ChainError, ChainJoint, ChainLink, Joints, LimitError, Limits, Link,
-    SerialChain, Unreached, UrGeometry,
+    ArmBodies, ArmGeometry, ChainError, ChainJoint, ChainLink, IkFailure, Joints, LimitError,
+    Limits, Link, SerialChain, UrGeometry,
 };
 
 use crate::chains::{seven_joints, ur_chain};
@@ -200,7 +200,7 @@ fn an_arm_at_the_end_of_a_range_goes_round_it_or_names_the_joint() {
         .nearest(&ArmGeometry::from(ur).flange(&beyond), &now)
         .unwrap_err();
     assert!(
-        matches!(&refused, Unreached::Range { joint, .. } if &**joint == "joint2"),
+        matches!(&refused, IkFailure::Range { joint, .. } if &**joint == "joint2"),
         "{refused:?}"
     );
 }
@@ -209,7 +209,7 @@ fn an_arm_at_the_end_of_a_range_goes_round_it_or_names_the_joint() {
 fn what_is_out_of_reach_is_refused_at_once_and_what_is_within_is_found_from_afar() {
     let arm = ArmGeometry::from(seven_joints());
     let far = Isometry3::translation(1.3, 0.0, 0.3);
-    assert_eq!(arm.nearest(&far, &in_range([0.5; 7])), Err(Unreached::Pose));
+    assert_eq!(arm.nearest(&far, &in_range([0.5; 7])), Err(IkFailure::Pose));
     // from each of some configurations to the flange of each other
     let places = [
         [0.3; 7],

@@ -3,11 +3,11 @@
 use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
-use touchup::features::{Feature, Kind, Measured};
+use touchup::features::{Feature, FeatureKind, MeasuredValue};
 use touchup::probing::arm::{
-    Arm, ArmError, ArmState, Command, LimitError, Limits, Narrower, Observer, OnsetVerdict,
-    ProbeError, Safety, StopRequest, TouchOutcome, TouchParams, TouchRecord, TouchTarget,
-    UNEXPECTED, Watched,
+    Arm, ArmError, ArmState, Command, LimitError, Limits, Observer, OnsetVerdict, ProbeError,
+    RequestLimits, Safety, StopRequest, SupervisedArm, TouchOutcome, TouchParams, TouchRecord,
+    TouchTarget, UNEXPECTED,
 };
 use touchup::probing::plan::{ExploreError, Explorer, PatternParams, TouchResult};
 use touchup::sim::{ArmFault, ArmParams, Plate, SensorFault, SimArm};
@@ -52,7 +52,7 @@ pub(super) fn touched(
     target: &TouchTarget,
 ) -> Result<TouchRecord, ProbeError> {
     let mut onlooker = Onlooker;
-    let mut watched = Watched::new(arm, limits(), &mut onlooker);
+    let mut watched = SupervisedArm::new(arm, limits(), &mut onlooker);
     watched.zero()?;
     watched.touch(target, touching)
 }
@@ -117,7 +117,7 @@ fn the_contact_is_where_the_ball_touches_and_not_where_the_arm_rests() {
             SimArm::new(&plate, params.clone(), &at(&params, [16e-3, 36e-3, 30e-3])).unwrap();
         if is_wall {
             let mut onlooker = Onlooker;
-            let mut watched = Watched::new(&mut arm, limits(), &mut onlooker);
+            let mut watched = SupervisedArm::new(&mut arm, limits(), &mut onlooker);
             watched.zero().unwrap();
             watched
                 .line("going down", &target.standoff_bt, 10e-3, &touching, 1.5)
@@ -178,7 +178,7 @@ pub(super) fn explored(
     search: &mut Explorer,
 ) -> f64 {
     let mut onlooker = Onlooker;
-    let mut watched = Watched::new(arm, limits(), &mut onlooker);
+    let mut watched = SupervisedArm::new(arm, limits(), &mut onlooker);
     watched.zero().unwrap();
     let pose = |place: &Point3<f64>| at(params, (*place).into());
     let (mut from, mut peak) = (None, 0.0f64);
@@ -255,7 +255,7 @@ fn hole_search(flag: &Point3<f64>) -> Explorer {
         ..PatternParams::default()
     };
     Explorer::new(
-        Some(Kind::Hole),
+        Some(FeatureKind::Hole),
         flag,
         &Vector3::z_axis(),
         params,
@@ -414,7 +414,7 @@ fn a_link_that_meets_something_rigid_keeps_the_limit_of_force_and_comes_free() {
             ..limits()
         };
         let mut world = Onlooker;
-        let mut watched = Watched::new(&mut arm, limits.clone(), &mut world);
+        let mut watched = SupervisedArm::new(&mut arm, limits.clone(), &mut world);
         watched.zero().unwrap();
         let inside = at(&params, [45e-3, 8e-3, TOP - 5e-3]);
         let met = match leaves {
@@ -466,7 +466,7 @@ fn a_wall_beside_the_way_out_is_no_obstacle() {
     let above = at(&params, [wall + 0.5e-3, HOLE.0[1], TOP + 5e-3]);
     let mut arm = SimArm::new(&plate, params, &inside).unwrap();
     let mut seen = ForceSeen::default();
-    let mut watched = Watched::new(&mut arm, limits(), &mut seen);
+    let mut watched = SupervisedArm::new(&mut arm, limits(), &mut seen);
     watched.zero().unwrap();
     watched
         .leave("going up", &above, touching.link_speed, &touching)
@@ -493,7 +493,7 @@ fn a_rim_that_is_passed_while_the_arm_brakes_is_no_obstacle() {
         let above = at(&params, [wall + beyond, HOLE.0[1], TOP + 5e-3]);
         let mut arm = SimArm::new(&plate, params.clone(), &inside).unwrap();
         let mut seen = ForceSeen::default();
-        let mut watched = Watched::new(&mut arm, limits(), &mut seen);
+        let mut watched = SupervisedArm::new(&mut arm, limits(), &mut seen);
         watched.zero().unwrap();
         let left = watched.leave("going up", &above, touching.link_speed, &touching);
         left.unwrap_or_else(|error| panic!("{:.0} µm: {error}", beyond * 1e6));
@@ -552,7 +552,7 @@ fn a_force_with_the_other_sign_is_named_at_the_first_contact() {
         alter: |state: &mut ArmState| state.wrench_b.force *= -1.0,
     };
     let mut world = Onlooker;
-    let mut watched = Watched::new(&mut turned, limits(), &mut world);
+    let mut watched = SupervisedArm::new(&mut turned, limits(), &mut world);
     watched.zero().unwrap();
     let error = watched
         .touch(
@@ -581,7 +581,7 @@ fn a_sensor_that_feels_something_is_not_zeroed() {
         arm: SimArm::new(&plate, params.clone(), &free).unwrap(),
         alter,
     };
-    let error = Watched::new(&mut pressed, limits(), &mut world)
+    let error = SupervisedArm::new(&mut pressed, limits(), &mut world)
         .zero()
         .unwrap_err();
     assert!(
@@ -594,7 +594,7 @@ fn a_sensor_that_feels_something_is_not_zeroed() {
         state.wrench_b.force.x += 20.0 * (state.stamp_ns % 1_000_000_000) as f64 * 1e-9
     };
     let mut leaned = Altered { arm, alter };
-    let error = Watched::new(
+    let error = SupervisedArm::new(
         &mut leaned,
         Limits {
             tare: 50.0,
@@ -616,7 +616,9 @@ fn a_sensor_that_feels_something_is_not_zeroed() {
             ..params.clone()
         };
         let mut arm = SimArm::new(&plate, params.clone(), &free).unwrap();
-        Watched::new(&mut arm, limits(), &mut world).zero().unwrap();
+        SupervisedArm::new(&mut arm, limits(), &mut world)
+            .zero()
+            .unwrap();
     }
 }
 
@@ -835,7 +837,7 @@ fn a_cancelled_touch_stops() {
     let (plate, params) = (Plate::default(), ArmParams::default());
     let mut arm = SimArm::new(&plate, params.clone(), &at(&params, [45e-3, 8e-3, 25e-3])).unwrap();
     let mut impatient = Impatient { seen: 0 };
-    let mut watched = Watched::new(&mut arm, limits(), &mut impatient);
+    let mut watched = SupervisedArm::new(&mut arm, limits(), &mut impatient);
     watched.zero().unwrap();
     let error = watched
         .touch(
@@ -902,7 +904,7 @@ impl Arm for Creeping {
 #[test]
 fn an_arm_that_creeps_is_not_at_rest() {
     let (mut arm, mut onlooker) = (Creeping { stamp_ns: 0 }, Onlooker);
-    let error = Watched::new(&mut arm, limits(), &mut onlooker)
+    let error = SupervisedArm::new(&mut arm, limits(), &mut onlooker)
         .zero()
         .unwrap_err();
     assert!(
@@ -990,10 +992,10 @@ fn a_slide_keeps_its_force() {
 fn a_request_can_only_narrow_the_limits() {
     let limits = limits();
     let less = limits
-        .narrowed(&Narrower {
+        .narrowed(&RequestLimits {
             force: Some(5.0),
             speed: Some(0.02),
-            ..Narrower::default()
+            ..RequestLimits::default()
         })
         .unwrap();
     assert_eq!(
@@ -1001,9 +1003,9 @@ fn a_request_can_only_narrow_the_limits() {
         (5.0, 0.02, limits.search)
     );
     let wider = limits
-        .narrowed(&Narrower {
+        .narrowed(&RequestLimits {
             speed: Some(0.5),
-            ..Narrower::default()
+            ..RequestLimits::default()
         })
         .unwrap_err();
     assert_eq!(
@@ -1013,9 +1015,9 @@ fn a_request_can_only_narrow_the_limits() {
     for bad in [0.0, -1.0, f64::NAN] {
         assert!(
             limits
-                .narrowed(&Narrower {
+                .narrowed(&RequestLimits {
                     force: Some(bad),
-                    ..Narrower::default()
+                    ..RequestLimits::default()
                 })
                 .is_err(),
             "{bad}"
@@ -1063,7 +1065,7 @@ fn places_that_cannot_be_are_refused_before_anything_moves() {
 /// One feature of the plate, from a click up to 3 mm off: the result, the touches and the largest
 /// force.
 fn explored_from(
-    kind: Kind,
+    kind: FeatureKind,
     near: Point3<f64>,
     seed: u64,
     params: PatternParams,
@@ -1117,7 +1119,7 @@ fn explored_from(
     (found.feature.unwrap(), found.touches, peak)
 }
 
-fn value(measured: &Option<Measured<f64>>) -> f64 {
+fn value(measured: &Option<MeasuredValue<f64>>) -> f64 {
     measured.as_ref().unwrap().value
 }
 
@@ -1130,8 +1132,12 @@ fn a_slot_is_found_from_one_click_and_measured() {
         ..PatternParams::default()
     };
     for seed in 0..4 {
-        let (slot, touches, peak) =
-            explored_from(Kind::Slot, Point3::new(25e-3, 14e-3, TOP), seed, params);
+        let (slot, touches, peak) = explored_from(
+            FeatureKind::Slot,
+            Point3::new(25e-3, 14e-3, TOP),
+            seed,
+            params,
+        );
         let errors = [
             (slot.centre.value - Point3::new(25e-3, 14e-3, TOP)).norm(),
             value(&slot.width) - 6e-3,
@@ -1161,7 +1167,7 @@ fn a_boss_is_found_from_one_click_and_measured() {
     };
     for seed in 0..4 {
         let (boss, touches, peak) = explored_from(
-            Kind::Boss,
+            FeatureKind::Boss,
             Point3::new(47e-3, 25e-3, TOP + 4e-3),
             seed,
             params,
@@ -1189,8 +1195,12 @@ fn an_edge_is_found_from_one_click_and_measured() {
         ..PatternParams::default()
     };
     for seed in 0..4 {
-        let (edge, touches, peak) =
-            explored_from(Kind::Edge, Point3::new(60e-3, 25e-3, TOP), seed, params);
+        let (edge, touches, peak) = explored_from(
+            FeatureKind::Edge,
+            Point3::new(60e-3, 25e-3, TOP),
+            seed,
+            params,
+        );
         let centre = edge.centre.value;
         let errors = [centre.x - 60e-3, centre.z - TOP, edge.axis.unwrap().value.x];
         println!(
@@ -1215,8 +1225,12 @@ fn a_plane_is_measured() {
         ..PatternParams::default()
     };
     for seed in 0..4 {
-        let (plane, touches, _) =
-            explored_from(Kind::Plane, Point3::new(45e-3, 9e-3, TOP), seed, params);
+        let (plane, touches, _) = explored_from(
+            FeatureKind::Plane,
+            Point3::new(45e-3, 9e-3, TOP),
+            seed,
+            params,
+        );
         let normal = plane.axis.unwrap().value;
         let errors = [plane.centre.value.z - TOP, normal.x, normal.y];
         println!(
@@ -1236,7 +1250,7 @@ fn where_no_edge_is_none_is_found() {
     let mut arm = SimArm::new(&plate, params.clone(), &at(&params, [45e-3, 8e-3, 30e-3])).unwrap();
     let flag = Point3::new(45e-3, 9e-3, TOP);
     let mut search = Explorer::new(
-        Some(Kind::Edge),
+        Some(FeatureKind::Edge),
         &flag,
         &Vector3::z_axis(),
         PatternParams {

@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Point3, Rotation3, Unit, UnitQuaternion, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
-use touchup::features::{Kind, Measured};
+use touchup::features::{FeatureKind, MeasuredValue};
 use touchup::probing::arm::{OnsetVerdict, TouchOutcome, TouchParams, TouchTarget};
 use touchup::probing::plan::{Explorer, PatternParams};
 use touchup::sim::{ArmParams, Bounds, Plate, SimArm, Surface, SurfacePoint};
@@ -146,7 +146,7 @@ fn a_slot_is_found_at_every_angle() {
             let start = at(&params, [MIDDLE[0], MIDDLE[1], 30e-3]);
             let mut arm = SimArm::new(&plate, params.clone(), &start).unwrap();
             let mut search = Explorer::new(
-                Some(Kind::Slot),
+                Some(FeatureKind::Slot),
                 &flag,
                 &Vector3::z_axis(),
                 PatternParams {
@@ -159,12 +159,12 @@ fn a_slot_is_found_at_every_angle() {
             explored(&mut arm, &params, &touching, &mut search);
             let said = match search.found().map(|found| (found.touches, found.feature)) {
                 Err(error) => error.to_string(),
-                Ok((touches, Some(slot))) if slot.kind == Kind::Slot => {
+                Ok((touches, Some(slot))) if slot.kind == FeatureKind::Slot => {
                     let off = slot.centre.value - Point3::from(MIDDLE);
                     let along =
                         Rotation3::from_axis_angle(&Vector3::z_axis(), angle) * Vector3::x();
                     let number =
-                        |measured: &Option<Measured<f64>>| measured.as_ref().unwrap().value;
+                        |measured: &Option<MeasuredValue<f64>>| measured.as_ref().unwrap().value;
                     let [width, length] =
                         [number(&slot.width) - 6e-3, number(&slot.length) - 20e-3];
                     // across the axis: its tilt is that of the top

@@ -2,22 +2,26 @@
 //! feature is probed.
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
-use touchup::features::Kind;
+use touchup::features::FeatureKind;
 use touchup::probing::arm::ProbeError;
-use touchup::probing::execute::{Ending, Flag, Probed, Prober, References};
+use touchup::probing::execute::{Ending, Flag, FlagResult, Prober, References};
 use touchup::sim::{ArmFault, ArmParams, Plate, SensorFault, SimArm};
 
-use super::static_scan::StaticScan;
 use super::{cell, params};
 use crate::plate_stream::plate_scan;
+use crate::static_scan::StaticScan;
 
-const HOLE: (Kind, [f64; 3]) = (Kind::Hole, [17e-3, 35e-3, 12e-3]);
-const PLANE: (Kind, [f64; 3]) = (Kind::Plane, [45e-3, 8e-3, 12e-3]);
-const SLOT: (Kind, [f64; 3]) = (Kind::Slot, [26e-3, 13e-3, 12e-3]);
-const BOSS: (Kind, [f64; 3]) = (Kind::Boss, [47.5e-3, 26e-3, 16e-3]);
+const HOLE: (FeatureKind, [f64; 3]) = (FeatureKind::Hole, [17e-3, 35e-3, 12e-3]);
+const PLANE: (FeatureKind, [f64; 3]) = (FeatureKind::Plane, [45e-3, 8e-3, 12e-3]);
+const SLOT: (FeatureKind, [f64; 3]) = (FeatureKind::Slot, [26e-3, 13e-3, 12e-3]);
+const BOSS: (FeatureKind, [f64; 3]) = (FeatureKind::Boss, [47.5e-3, 26e-3, 16e-3]);
 
 /// Probes features one after the other, until one is stopped.
-fn probed(wanted: &[(Kind, [f64; 3])], seed: u64, change: impl FnOnce(&mut SimArm)) -> Vec<Probed> {
+fn probed(
+    wanted: &[(FeatureKind, [f64; 3])],
+    seed: u64,
+    change: impl FnOnce(&mut SimArm),
+) -> Vec<FlagResult> {
     let (plate, cell, params) = (Plate::default(), cell(), params());
     let start: Isometry3<f64> = cell.pose(
         &UnitQuaternion::identity(),
@@ -56,7 +60,12 @@ fn probed(wanted: &[(Kind, [f64; 3])], seed: u64, change: impl FnOnce(&mut SimAr
 fn what_moved_while_a_feature_was_probed_is_found_by_a_contact_that_is_touched_again() {
     let mm = |x: f64, y: f64, z: f64| Vector3::new(x, y, z) * 1e-3;
     let moved = |turn_mrad: f64, by| ArmFault::PartMoved(Vector3::z() * turn_mrad * 1e-3, by);
-    type Case = (&'static str, &'static [(Kind, [f64; 3])], usize, ArmFault);
+    type Case = (
+        &'static str,
+        &'static [(FeatureKind, [f64; 3])],
+        usize,
+        ArmFault,
+    );
     let cases: [Case; 9] = [
         (
             "tip bent by 1 mm",

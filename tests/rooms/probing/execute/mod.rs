@@ -4,27 +4,23 @@ mod interrupted;
 mod opened;
 mod planning;
 mod sliding;
-mod static_scan;
 mod uncertainty;
 mod way_out;
 
-#[cfg(feature = "ros")]
-pub use static_scan::StaticScan;
-
 use nalgebra::Point3;
 use touchup::probing::arm::{Limits, TouchParams};
-use touchup::probing::execute::{Cell, ProbeParams, Tool};
+use touchup::probing::execute::{ProbeParams, RobotCell, Tool};
 use touchup::probing::plan::PatternParams;
 use touchup::sim::ArmParams;
 
-fn cell() -> Cell {
+fn cell() -> RobotCell {
     let ArmParams {
         geometry,
         pose_bo,
         pose_ft,
         ..
     } = ArmParams::default();
-    Cell {
+    RobotCell {
         geometry,
         pose_bo,
         pose_ft,

@@ -4,24 +4,26 @@
 use std::sync::Arc;
 
 use nalgebra::{Point3, UnitQuaternion, Vector3};
-use touchup::features::Kind;
+use touchup::features::FeatureKind;
 use touchup::live::{Engine, Gate, LiveError, Pace, Renewal};
 use touchup::mesh::{FaceHit, FaceTree, TriMesh};
 use touchup::probing::arm::{Arm, ArmState, Observer, StopRequest};
-use touchup::probing::execute::{Cell, Ending, Flag, Plan, Probed, Prober, Progress, World, plan};
+use touchup::probing::execute::{
+    Ending, Flag, FlagResult, Plan, Prober, Progress, RobotCell, World, plan,
+};
 use touchup::scene::Scene;
 use touchup::sim::{ArmParams, Plate, SimArm};
 use touchup::stylus::{Sample, WrenchFrame};
 
-use super::static_scan::StaticScan;
 use super::{cell, params};
 use crate::plate_stream::plate_scan;
+use crate::static_scan::StaticScan;
 
 /// The mesh that follows what the arm feels, as the node has it; it has the arm stay after some
 /// states.
 struct RefinedScan {
     engine: Engine,
-    cell: Cell,
+    cell: RobotCell,
     stays_after: Option<usize>,
     seen: usize,
 }
@@ -93,7 +95,7 @@ impl World for RefinedScan {
 fn hole(height: f64) -> Flag {
     Flag {
         id: 7,
-        kind: Some(Kind::Hole),
+        kind: Some(FeatureKind::Hole),
         place: Point3::new(16e-3, 36e-3, height),
         radius: 3e-3,
     }
@@ -107,7 +109,7 @@ fn arm(plate: &Plate) -> SimArm<'_> {
     SimArm::new(plate, ArmParams::default(), &start).unwrap()
 }
 
-fn diameter(probed: &Probed) -> Option<f64> {
+fn diameter(probed: &FlagResult) -> Option<f64> {
     Some(
         probed
             .found
@@ -160,9 +162,9 @@ fn planned(mesh: TriMesh, flag: &Flag) -> Plan {
 fn a_plan_for_what_is_open_begins_above_the_surface_around_it_wherever_the_flag_is() {
     // through hole, blind hole with its floor at 4 mm, slot with its floor at 7 mm
     let flags = [
-        (Kind::Hole, [16e-3, 36e-3]),
-        (Kind::Hole, [32e-3, 34e-3]),
-        (Kind::Slot, [25e-3, 14e-3]),
+        (FeatureKind::Hole, [16e-3, 36e-3]),
+        (FeatureKind::Hole, [32e-3, 34e-3]),
+        (FeatureKind::Slot, [25e-3, 14e-3]),
     ];
     for (kind, [x, y]) in flags {
         for z in [14e-3, 12e-3, 10e-3, 8e-3, 5e-3] {
@@ -203,13 +205,19 @@ fn flags_of_what_is_no_opening_are_on_what_is_nearest() {
         radius: 3e-3,
     };
     for above in [-2e-3, 0.0, 2e-3] {
-        let boss = planned(mesh(), &flag(Kind::Boss, [47e-3, 25e-3, 16e-3 + above]));
+        let boss = planned(
+            mesh(),
+            &flag(FeatureKind::Boss, [47e-3, 25e-3, 16e-3 + above]),
+        );
         assert!(
             (boss.touches[0].from.z - 20.5e-3).abs() < 1e-9,
             "{}",
             boss.touches[0].from
         );
-        let plane = planned(mesh(), &flag(Kind::Plane, [45e-3, 8e-3, 12e-3 + above]));
+        let plane = planned(
+            mesh(),
+            &flag(FeatureKind::Plane, [45e-3, 8e-3, 12e-3 + above]),
+        );
         assert!(
             (plane.touches[0].from.z - 16.5e-3).abs() < 1e-9,
             "{}",

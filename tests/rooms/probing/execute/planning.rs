@@ -7,32 +7,32 @@ use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
-use touchup::features::Kind;
+use touchup::features::FeatureKind;
 use touchup::io::mesh_file::{MeshFile, MeshUnit, read_mesh};
 use touchup::mesh::{FaceHit, TriMesh};
 use touchup::probing::arm::{
     Arm, ArmGeometry, ArmState, Limits, Observer, ProbeError, Safety, StopRequest, UrGeometry,
 };
 use touchup::probing::execute::{
-    Cell, Clearance, Ending, Flag, PlannedMotion, ProbeParams, Probed, Prober, Progress, Tool,
-    World, plan,
+    Clearance, Ending, Flag, FlagResult, PlannedMotion, ProbeParams, Prober, Progress, RobotCell,
+    Tool, World, plan,
 };
 use touchup::probing::plan::PatternParams;
 use touchup::sim::{ArmFault, ArmParams, Plate, SimArm, Surface};
 
-use super::static_scan::StaticScan;
 use super::{cell, params};
 use crate::chains::seven_joints;
 use crate::plate_stream::plate_scan;
+use crate::static_scan::StaticScan;
 
 const HOLE: Flag = Flag {
     id: 7,
-    kind: Some(Kind::Hole),
+    kind: Some(FeatureKind::Hole),
     place: Point3::new(17e-3, 35e-3, 12e-3),
     radius: 3e-3,
 };
 
-fn above(cell: &Cell, place: [f64; 3]) -> Isometry3<f64> {
+fn above(cell: &RobotCell, place: [f64; 3]) -> Isometry3<f64> {
     cell.pose(&UnitQuaternion::identity(), &place.into())
 }
 
@@ -41,7 +41,7 @@ fn probed(
     params: &ProbeParams,
     world: &mut StaticScan,
     change: impl FnOnce(&mut SimArm),
-) -> (Probed, f64, [f64; 3]) {
+) -> (FlagResult, f64, [f64; 3]) {
     let (plate, cell) = (Plate::default(), cell());
     let mut arm = SimArm::new(
         &plate,
@@ -103,7 +103,7 @@ fn a_flag_becomes_a_feature() {
 fn a_flag_becomes_a_feature_with_seven_joints_as_with_a_ur() {
     let chain = seven_joints();
     let geometry = ArmGeometry::from(chain.clone());
-    let cell = Cell {
+    let cell = RobotCell {
         geometry: geometry.clone(),
         pose_bo: Isometry3::translation(0.45, -0.03, 0.15),
         ..cell()
@@ -374,7 +374,7 @@ fn the_deviation_of_a_touch_is_from_the_mesh_before_it() {
     .unwrap();
     let flag = Flag {
         id: 1,
-        kind: Some(Kind::Plane),
+        kind: Some(FeatureKind::Plane),
         place: Point3::new(45e-3, 9e-3, 12e-3),
         radius: 3e-3,
     };
@@ -404,7 +404,7 @@ fn the_deviation_of_a_touch_is_from_the_mesh_before_it() {
 struct Turning {
     scan: StaticScan,
     plate: Plate,
-    cell: Cell,
+    cell: RobotCell,
     before: Option<UnitQuaternion<f64>>,
     fastest: f64,
     nearest: f64,
@@ -726,7 +726,7 @@ fn no_plan_leaves_the_limits_or_passes_through_the_mesh() {
         let middle = nalgebra::center(&low, &high);
         let base = Point3::new(-0.4, -0.1, 0.1);
         let pose_bo = Isometry3::translation(base.x - middle.x, base.y - middle.y, base.z - low.z);
-        let cell = Cell {
+        let cell = RobotCell {
             pose_bo,
             geometry: UrGeometry::UR10E.into(),
             ..cell()
@@ -751,7 +751,12 @@ fn no_plan_leaves_the_limits_or_passes_through_the_mesh() {
             joints,
             safety: Safety::Normal,
         };
-        for kind in [Some(Kind::Hole), Some(Kind::Edge), Some(Kind::Plane), None] {
+        for kind in [
+            Some(FeatureKind::Hole),
+            Some(FeatureKind::Edge),
+            Some(FeatureKind::Plane),
+            None,
+        ] {
             let [a, b, c] = faces[rng.random_range(0..faces.len())];
             let place = Point3::from((a.coords + b.coords + c.coords) / 3.0);
             let flag = Flag {

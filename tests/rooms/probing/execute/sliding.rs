@@ -2,14 +2,14 @@
 //! from every place is exact.
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
-use touchup::features::Kind;
+use touchup::features::FeatureKind;
 use touchup::mesh::{FaceHit, TriMesh};
 use touchup::probing::arm::{
     Arm, ArmState, Limits, Observer, SlideEnding, SlideRecord, SlideTarget, StopRequest,
-    TouchParams, Watched,
+    SupervisedArm, TouchParams,
 };
 use touchup::probing::execute::{
-    Ending, Flag, Phase, ProbeParams, Probed, Prober, Progress, StaticWorld, World, plan,
+    Ending, Flag, FlagResult, Phase, ProbeParams, Prober, Progress, StaticWorld, World, plan,
 };
 use touchup::probing::plan::{Slide, Station};
 use touchup::sim::{ArmParams, Plate, SimArm, Surface};
@@ -29,7 +29,7 @@ fn params() -> ProbeParams {
     }
 }
 
-fn flag(kind: Option<Kind>, [x, y, z]: [f64; 3], radius: f64) -> Flag {
+fn flag(kind: Option<FeatureKind>, [x, y, z]: [f64; 3], radius: f64) -> Flag {
     Flag {
         id: 1,
         kind,
@@ -49,7 +49,7 @@ fn start() -> Isometry3<f64> {
     )
 }
 
-fn probed(flag: &Flag, world: &mut dyn World) -> (Probed, Point3<f64>) {
+fn probed(flag: &Flag, world: &mut dyn World) -> (FlagResult, Point3<f64>) {
     let (plate, cell) = (Plate::default(), cell());
     let mut arm = SimArm::new(&plate, ArmParams::default(), &start()).unwrap();
     let probed = Prober::new(&mut arm, &cell, &params(), world).probe(flag);
@@ -97,12 +97,12 @@ fn lies_on(plate: &Plate, slide: &Slide) {
 fn slides_lie_on_what_was_found_and_keep_their_force() {
     let plate = Plate::default();
     let flags = [
-        flag(Some(Kind::Hole), [17e-3, 35e-3, TOP], 3e-3),
-        flag(Some(Kind::Hole), [32.5e-3, 35e-3, TOP], 3e-3),
-        flag(Some(Kind::Slot), [26e-3, 13e-3, TOP], 3e-3),
-        flag(Some(Kind::Boss), [47.5e-3, 26e-3, TOP + 4e-3], 3e-3),
-        flag(Some(Kind::Edge), [59e-3, 25e-3, TOP], 3e-3),
-        flag(Some(Kind::Plane), [45e-3, 9e-3, TOP], 5e-3),
+        flag(Some(FeatureKind::Hole), [17e-3, 35e-3, TOP], 3e-3),
+        flag(Some(FeatureKind::Hole), [32.5e-3, 35e-3, TOP], 3e-3),
+        flag(Some(FeatureKind::Slot), [26e-3, 13e-3, TOP], 3e-3),
+        flag(Some(FeatureKind::Boss), [47.5e-3, 26e-3, TOP + 4e-3], 3e-3),
+        flag(Some(FeatureKind::Edge), [59e-3, 25e-3, TOP], 3e-3),
+        flag(Some(FeatureKind::Plane), [45e-3, 9e-3, TOP], 5e-3),
     ];
     for flag in flags {
         let (probed, end) = probed(&flag, &mut world());
@@ -180,7 +180,7 @@ fn slid(from: [f64; 2], to: [f64; 2], height: f64) -> (SlideRecord, Point3<f64>,
     };
     let mut onlooker = Onlooker;
     let limits = self::params().limits;
-    let mut watched = Watched::new(&mut arm, limits, &mut onlooker);
+    let mut watched = SupervisedArm::new(&mut arm, limits, &mut onlooker);
     watched.zero().unwrap();
     let record = watched.slide(&target, &TouchParams::default()).unwrap();
     assert_eq!(watched.reached, Some(record.reached));
@@ -268,7 +268,7 @@ fn a_cancelled_slide_comes_out_of_the_hole() {
         seen: 0,
     };
     let (probed, end) = probed(
-        &flag(Some(Kind::Hole), [17e-3, 35e-3, TOP], 3e-3),
+        &flag(Some(FeatureKind::Hole), [17e-3, 35e-3, TOP], 3e-3),
         &mut world,
     );
     assert_eq!(probed.ending, Ending::Cancelled(StopRequest::Retract));
@@ -282,7 +282,7 @@ fn slides_are_planned_and_checked() {
     let (plate, cell, params) = (Plate::default(), cell(), params());
     let mut arm = SimArm::new(&plate, ArmParams::default(), &start()).unwrap();
     let now = arm.next_state().unwrap();
-    let flag = flag(Some(Kind::Plane), [45e-3, 9e-3, TOP], 5e-3);
+    let flag = flag(Some(FeatureKind::Plane), [45e-3, 9e-3, TOP], 5e-3);
     let planned = plan(&cell, &params, &world(), &flag, &now, None).unwrap();
     assert_eq!(
         (planned.slides.len(), planned.held_back.len()),

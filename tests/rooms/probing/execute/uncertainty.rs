@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
-use touchup::features::{Feature, Kind};
+use touchup::features::{Feature, FeatureKind};
 use touchup::mesh::{FaceHit, TriMesh};
 use touchup::probing::arm::{ArmState, Observer};
 use touchup::probing::execute::{
@@ -49,7 +49,7 @@ const ABOUT: Point3<f64> = Point3::new(30e-3, 25e-3, 12e-3);
 /// counts, and its sizes, m.
 struct Drawn {
     name: &'static str,
-    kind: Kind,
+    kind: FeatureKind,
     place: [f64; 3],
     axis: Vector3<f64>,
     /// those in which its place is determined
@@ -60,7 +60,7 @@ struct Drawn {
 const DRAWN: [Drawn; 5] = [
     Drawn {
         name: "hole",
-        kind: Kind::Hole,
+        kind: FeatureKind::Hole,
         place: [16e-3, 36e-3, 12e-3],
         axis: Vector3::new(0.0, 0.0, 1.0),
         across: &[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
@@ -68,7 +68,7 @@ const DRAWN: [Drawn; 5] = [
     },
     Drawn {
         name: "slot",
-        kind: Kind::Slot,
+        kind: FeatureKind::Slot,
         place: [25e-3, 14e-3, 12e-3],
         axis: Vector3::new(0.0, 0.0, 1.0),
         across: &[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
@@ -76,7 +76,7 @@ const DRAWN: [Drawn; 5] = [
     },
     Drawn {
         name: "boss",
-        kind: Kind::Boss,
+        kind: FeatureKind::Boss,
         place: [47e-3, 25e-3, 12e-3],
         axis: Vector3::new(0.0, 0.0, 1.0),
         across: &[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
@@ -84,7 +84,7 @@ const DRAWN: [Drawn; 5] = [
     },
     Drawn {
         name: "plane",
-        kind: Kind::Plane,
+        kind: FeatureKind::Plane,
         place: [45e-3, 9e-3, 12e-3],
         axis: Vector3::new(0.0, 0.0, 1.0),
         across: &[[0.0, 0.0, 1.0]],
@@ -92,7 +92,7 @@ const DRAWN: [Drawn; 5] = [
     },
     Drawn {
         name: "edge",
-        kind: Kind::Edge,
+        kind: FeatureKind::Edge,
         place: [60e-3, 25e-3, 12e-3],
         axis: Vector3::new(0.0, 1.0, 0.0),
         across: &[[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]],
@@ -121,7 +121,9 @@ impl Drawn {
         let sizes = [&found.diameter, &found.width, &found.length]
             .into_iter()
             .flatten();
-        let sizes = sizes.filter(|_| self.kind != Kind::Edge).zip(self.sizes);
+        let sizes = sizes
+            .filter(|_| self.kind != FeatureKind::Edge)
+            .zip(self.sizes);
         let sizes = sizes
             .map(|(size, drawn)| (size.value - drawn).abs() / size.std.unwrap())
             .collect();
@@ -170,7 +172,11 @@ fn probed(drawn: &Drawn, seed: u64, scan: &TriMesh, world: &World) -> Result<Nor
         rng.random_range(0.0..std::f64::consts::TAU),
         rng.random_range(0.0..2e-3),
     );
-    let height = if drawn.kind == Kind::Boss { 4e-3 } else { 0.0 };
+    let height = if drawn.kind == FeatureKind::Boss {
+        4e-3
+    } else {
+        0.0
+    };
     let place = Point3::from(drawn.place)
         + Vector3::new(off * f64::cos(angle), off * f64::sin(angle), height);
     let flag = Flag {
@@ -271,7 +277,7 @@ fn errors_are_as_large_as_stated(world: &World, first: u64) {
             ("place", of(|one, _| one.0, 0)),
             ("direction", of(|one, _| one.1, 0)),
         ];
-        let names = if drawn.kind == Kind::Slot {
+        let names = if drawn.kind == FeatureKind::Slot {
             ["width", "length"]
         } else {
             ["diameter", ""]
@@ -329,8 +335,8 @@ impl ProbedWorld for SeenPlaces {
 #[test]
 fn the_arm_comes_anew_to_each_touch_of_a_wall_nearby() {
     for (kind, place, ball) in [
-        (Kind::Slot, [25e-3, 12.7e-3, 12e-3], 1.5e-3),
-        (Kind::Hole, [32e-3, 34e-3, 12e-3], 2.5e-3),
+        (FeatureKind::Slot, [25e-3, 12.7e-3, 12e-3], 1.5e-3),
+        (FeatureKind::Hole, [32e-3, 34e-3, 12e-3], 2.5e-3),
     ] {
         let (plate, mut cell, mut params) = (Plate::default(), cell(), params());
         cell.tool.ball_radius = ball;

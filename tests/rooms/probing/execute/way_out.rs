@@ -2,19 +2,19 @@
 //! that it came.
 
 use nalgebra::{Point3, UnitQuaternion, Vector3};
-use touchup::features::Kind;
+use touchup::features::FeatureKind;
 use touchup::probing::arm::{Arm, Command, StopRequest};
 use touchup::probing::execute::{Ending, Flag, Prober, WayOut, plan};
 use touchup::sim::{ArmParams, Plate, SimArm};
 
-use super::static_scan::StaticScan;
 use super::{cell, params};
 use crate::plate_stream::plate_scan;
+use crate::static_scan::StaticScan;
 
 /// The through hole of the plate, Ø 8 mm at (16, 36) mm in its top.
 const HOLE: Flag = Flag {
     id: 7,
-    kind: Some(Kind::Hole),
+    kind: Some(FeatureKind::Hole),
     place: Point3::new(16e-3, 36e-3, 12e-3),
     radius: 3e-3,
 };
@@ -26,7 +26,7 @@ const STOPS: [usize; 7] = [3000, 5000, 6011, 7222, 8433, 9644, 11055];
 fn stopping(stays_after: Option<usize>) -> StaticScan {
     StaticScan {
         stays_after,
-        part: Some(Plate::default()),
+        part: Some((Plate::default(), cell())),
         ..StaticScan::new(plate_scan(1))
     }
 }

@@ -6,7 +6,7 @@
 use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
 use touchup::reconstruct::{TouchFinder, TouchFinderParams};
 use touchup::sim::{
-    Bounds, Moment, SensorParams, Stroke, StylusParams, Surface, SurfacePoint, touch,
+    Bounds, SensorParams, Stroke, StylusParams, Surface, SurfacePoint, TrueState, touch,
 };
 use touchup::stylus::{
     ContactEstimator, ContactEstimatorParams, Friction, FrictionCoefficient, LocalMotion, Sample,
@@ -98,7 +98,7 @@ fn lines() -> Vec<Stroke> {
 /// The reported stream, and the truth.
 struct Stream {
     samples: Vec<Sample>,
-    moments: Vec<Moment>,
+    moments: Vec<TrueState>,
     start_ns: i64,
 }
 
@@ -151,7 +151,7 @@ impl Stream {
     /// Median of what friction really was, force along over force across: in the simulator it rises
     /// with the speed.
     fn true_friction(&self) -> f64 {
-        let of = |moment: &Moment| {
+        let of = |moment: &TrueState| {
             let normal = moment.contacts.first()?.normal;
             let across = moment.force_o.dot(&normal);
             (across > 0.5).then(|| (moment.force_o - normal * across).norm() / across)

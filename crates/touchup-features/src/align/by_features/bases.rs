@@ -4,21 +4,21 @@
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
 
 use super::landmark::{ALIKE, Landmark};
-use crate::features::Kind;
+use crate::features::FeatureKind;
 
 /// Class of a set of features.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum SetClass {
     /// two features with a place and an axis
-    Pair(Kind, Kind),
+    Pair(FeatureKind, FeatureKind),
     /// one such feature and a plane not square to its axis
-    Beside(Kind),
+    Beside(FeatureKind),
     /// a slot with its direction
     Slot,
     /// three planes that meet
     Corner,
     /// two features about one axis, or one and a plane square to it: the turn is open
-    Axis(Kind, Kind),
+    Axis(FeatureKind, FeatureKind),
 }
 
 /// A frame made of features.
@@ -74,7 +74,7 @@ pub(super) fn bases(landmarks: &[Landmark], all_frames: bool) -> Vec<Base> {
         );
         let planes = landmarks
             .iter()
-            .filter(|landmark| landmark.kind == Kind::Plane);
+            .filter(|landmark| landmark.kind == FeatureKind::Plane);
         bases.extend(planes.filter_map(|plane| beside(*i, first, plane)));
         bases.extend(slot(*i, first, 1.0));
         bases.extend(slot(*i, first, -1.0).filter(|_| all_frames));
@@ -177,7 +177,7 @@ pub(super) fn axial_bases(landmarks: &[Landmark], all_frames: bool) -> Vec<Base>
 fn about(of: [usize; 2], first: &Landmark, second: &Landmark) -> Option<Base> {
     let (axis, other) = (first.axis?, second.axis?);
     let between = second.place - first.place;
-    let is_about = second.kind == Kind::Plane
+    let is_about = second.kind == FeatureKind::Plane
         || (second.is_located() && axis.cross(&between).norm() <= LEAST_SINE * between.norm());
     let (class, length) = (
         SetClass::Axis(first.class(), second.class()),

@@ -3,9 +3,9 @@
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::alternative::Alternative;
-use super::judge::{Judge, Judged};
+use super::judge::{Judge, JudgedMotion};
 use super::landmark::{ALIKE, Landmark};
-use crate::features::Kind;
+use crate::features::FeatureKind;
 use touchup_geometry::numeric::{moved_by_twist, without_repeats};
 
 /// An undetermined turn.
@@ -25,7 +25,7 @@ const STEP: f64 = 2.399_963_229_728_653;
 impl Judge<'_> {
     /// The axis about which the motion may turn and explain as much: the axis of all its explained
     /// features, and of the surface if given.
-    pub(super) fn free_turn(&self, best: &Judged) -> Option<FreeTurn> {
+    pub(super) fn free_turn(&self, best: &JudgedMotion) -> Option<FreeTurn> {
         let explained: Vec<&Landmark> = best
             .explained()
             .map(|[_, theirs]| &self.matching.target[theirs])
@@ -70,9 +70,13 @@ fn axis_of(landmarks: &[&Landmark], near: f64) -> Option<FreeTurn> {
             .is_some_and(|own| own.dot(&axis).abs() >= ALIKE);
         let is_on = (landmark.place - through).cross(&axis).norm() <= near;
         match landmark.kind {
-            Kind::Plane => is_along,
-            Kind::Hole | Kind::Boss | Kind::Cylinder => is_along && is_on,
-            Kind::Slot | Kind::Pocket | Kind::Edge | Kind::Corner | Kind::Notch => false,
+            FeatureKind::Plane => is_along,
+            FeatureKind::Hole | FeatureKind::Boss | FeatureKind::Cylinder => is_along && is_on,
+            FeatureKind::Slot
+            | FeatureKind::Pocket
+            | FeatureKind::Edge
+            | FeatureKind::Corner
+            | FeatureKind::Notch => false,
         }
     };
     landmarks

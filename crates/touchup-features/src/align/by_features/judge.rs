@@ -5,7 +5,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use super::alternative::{Alternative, OrientedSample, SAME, Surfaces};
 use super::matching::Matching;
 use crate::align::icp::{IcpFit, IcpParams, icp};
-use touchup_geometry::mesh::Alone;
+use touchup_geometry::mesh::SerialWorkers;
 use touchup_geometry::numeric::{median, without_repeats};
 
 /// Maximum number of points that refine each motion; all points judge it, and refine the last ones.
@@ -41,7 +41,7 @@ const ABSENT_BETWEEN: [f64; 2] = [0.3, 2.0];
 
 /// A motion with its evidence.
 #[derive(Clone, Debug)]
-pub(super) struct Judged {
+pub(super) struct JudgedMotion {
     motion: Isometry3<f64>,
     fit: Option<IcpFit>,
     /// best partner of each feature of the source, and its misfit: offset over the allowed one
@@ -51,7 +51,7 @@ pub(super) struct Judged {
     distances: Vec<f64>,
 }
 
-impl Judged {
+impl JudgedMotion {
     /// Matched features: of the source, of the target.
     pub fn explained(&self) -> impl Iterator<Item = [usize; 2]> + '_ {
         let is_there = |(own, partner): (usize, &Option<(usize, f64)>)| {
@@ -121,7 +121,7 @@ impl<'a> Judge<'a> {
     }
 
     /// Refines each motion and judges it; the best first, no two alike.
-    pub fn all(&self, motions: &[Isometry3<f64>]) -> Vec<Judged> {
+    pub fn all(&self, motions: &[Isometry3<f64>]) -> Vec<JudgedMotion> {
         let step = self.points.len().div_ceil(MOST_POINTS).max(1);
         let points: Vec<Point3<f64>> = self.points.iter().step_by(step).map(|p| p.point).collect();
         let refined = motions.iter().map(|coarse| {
@@ -145,7 +145,7 @@ impl<'a> Judge<'a> {
             .iter()
             .map(|own| own.weight())
             .sum::<f64>();
-        let merit = |judged: &Judged| {
+        let merit = |judged: &JudgedMotion| {
             judged.weight(&self.matching) / all + judged.agreeing().unwrap_or(0.0)
         };
         judged.sort_by(|a, b| merit(b).total_cmp(&merit(a)));
@@ -158,10 +158,10 @@ impl<'a> Judge<'a> {
             reach: REACH * self.matching.tolerance,
             ..IcpParams::default()
         };
-        icp(points, target, tree, coarse, &params, &Alone).ok()
+        icp(points, target, tree, coarse, &params, &SerialWorkers).ok()
     }
 
-    fn judged(&self, motion: Isometry3<f64>, fit: Option<IcpFit>) -> Judged {
+    fn judged(&self, motion: Isometry3<f64>, fit: Option<IcpFit>) -> JudgedMotion {
         let coarse = COARSE * self.matching.tolerance;
         let distance = |p: &OrientedSample| {
             let Surfaces { target, tree, .. } = self.surfaces?;
@@ -174,7 +174,7 @@ impl<'a> Judge<'a> {
             .iter()
             .map(|p| distance(p).unwrap_or(f64::INFINITY))
             .collect();
-        Judged {
+        JudgedMotion {
             motion,
             fit,
             partners: self.matching.partners(&motion),
@@ -184,7 +184,7 @@ impl<'a> Judge<'a> {
 
     /// Whether the evidence decides for `a` against `b`: the surface, or if it does not decide, the
     /// features found on it.
-    fn rules_out(&self, a: &Judged, b: &Judged) -> bool {
+    fn rules_out(&self, a: &JudgedMotion, b: &JudgedMotion) -> bool {
         match (self.by_surface(a, b), self.by_surface(b, a)) {
             (true, false) => true,
             (false, true) => false,
@@ -193,9 +193,9 @@ impl<'a> Judge<'a> {
     }
 
     /// The motions that no other rules out; all of them if each has one that rules it out.
-    pub fn left_over(&self, judged: Vec<Judged>) -> Vec<Judged> {
-        let is_ruled_out = |b: &Judged| judged.iter().any(|a| self.rules_out(a, b));
-        let left: Vec<Judged> = judged
+    pub fn left_over(&self, judged: Vec<JudgedMotion>) -> Vec<JudgedMotion> {
+        let is_ruled_out = |b: &JudgedMotion| judged.iter().any(|a| self.rules_out(a, b));
+        let left: Vec<JudgedMotion> = judged
             .iter()
             .filter(|b| !is_ruled_out(b))
             .cloned()
@@ -204,14 +204,14 @@ impl<'a> Judge<'a> {
     }
 
     /// Whether all evidence decides for `a` against `b`.
-    pub fn is_better_throughout(&self, a: &Judged, b: &Judged) -> bool {
+    pub fn is_better_throughout(&self, a: &JudgedMotion, b: &JudgedMotion) -> bool {
         self.by_features(a, b) && (self.surfaces.is_none() || self.by_surface(a, b))
     }
 
     /// Decides among all points that belong to the target at all, or among the points on it within
     /// the scatter of the best fit.
-    fn by_surface(&self, a: &Judged, b: &Judged) -> bool {
-        let alone = |a: &Judged, b: &Judged, near: f64| {
+    fn by_surface(&self, a: &JudgedMotion, b: &JudgedMotion) -> bool {
+        let alone = |a: &JudgedMotion, b: &JudgedMotion, near: f64| {
             a.distances
                 .iter()
                 .zip(&b.distances)
@@ -232,7 +232,7 @@ impl<'a> Judge<'a> {
     }
 
     /// Largest distance of a point on the target within the scatter of the fit, m.
-    fn near(&self, judged: &Judged) -> f64 {
+    fn near(&self, judged: &JudgedMotion) -> f64 {
         let (tolerance, scatter) = (
             self.matching.tolerance,
             judged.fit.as_ref().map_or(0.0, |fit| fit.scatter),
@@ -240,8 +240,8 @@ impl<'a> Judge<'a> {
         (SCATTERS * scatter).clamp(LEAST_NEAR * tolerance, COARSE * tolerance)
     }
 
-    fn by_features(&self, a: &Judged, b: &Judged) -> bool {
-        let alone = |a: &Judged, b: &Judged| -> f64 {
+    fn by_features(&self, a: &JudgedMotion, b: &JudgedMotion) -> bool {
+        let alone = |a: &JudgedMotion, b: &JudgedMotion| -> f64 {
             let absent = a.absent();
             let own = self.matching.source.iter().enumerate();
             own.filter(|(i, _)| a.misfit(*i) <= 1.0 && b.misfit(*i) > a.misfit(*i) + absent)
@@ -253,7 +253,7 @@ impl<'a> Judge<'a> {
     }
 
     /// Whether `turn` keeps the surface on the target; facets of a round part count as round.
-    pub fn stays(&self, best: &Judged, turn: &Isometry3<f64>) -> bool {
+    pub fn stays(&self, best: &JudgedMotion, turn: &Isometry3<f64>) -> bool {
         let turned = self.judged(turn * best.motion, None);
         let is_lost = |(own, turned): &(&f64, &f64)| own.is_finite() && !turned.is_finite();
         let lost = best
@@ -266,7 +266,7 @@ impl<'a> Judge<'a> {
     }
 
     /// The motions of the result, refined with all points.
-    pub fn settled(&self, judged: Vec<Judged>) -> Vec<Alternative> {
+    pub fn settled(&self, judged: Vec<JudgedMotion>) -> Vec<Alternative> {
         let points: Vec<Point3<f64>> = self.points.iter().map(|p| p.point).collect();
         let mut alternatives: Vec<Alternative> = Vec::new();
         for judged in judged {

@@ -3,12 +3,12 @@
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 
 use super::alternative::FeaturesParams;
-use crate::features::{Feature, Kind};
+use crate::features::{Feature, FeatureKind};
 
 /// A feature, or its other end.
 #[derive(Clone, Debug)]
 pub(super) struct Landmark {
-    pub kind: Kind,
+    pub kind: FeatureKind,
     pub place: Point3<f64>,
     /// out of the opening, along an edge, outward normal
     pub axis: Option<Vector3<f64>>,
@@ -44,7 +44,7 @@ pub(super) fn landmarks(
 ) -> Vec<Landmark> {
     let planes: Vec<(Point3<f64>, Vector3<f64>)> = features
         .iter()
-        .filter(|feature| feature.kind == Kind::Plane)
+        .filter(|feature| feature.kind == FeatureKind::Plane)
         .filter_map(|feature| Some((feature.centre.value, feature.axis.as_ref()?.value)))
         .collect();
     let near = params.tolerance * diagonal;
@@ -58,7 +58,7 @@ impl Landmark {
     fn of(feature: &Feature, planes: &[(Point3<f64>, Vector3<f64>)], near: f64) -> Self {
         let place = feature.centre.value;
         let reach = match feature.kind {
-            Kind::Edge => feature
+            FeatureKind::Edge => feature
                 .length
                 .as_ref()
                 .map_or([0.0; 2], |length| [length.value / 2.0; 2]),
@@ -75,9 +75,9 @@ impl Landmark {
             sigma: feature.centre.std.unwrap_or(0.0),
             span: reach,
             is_through: feature.through == Some(true),
-            is_step: feature.kind == Kind::Cylinder && feature.depth.is_some(),
+            is_step: feature.kind == FeatureKind::Cylinder && feature.depth.is_some(),
             is_convex: feature.is_convex,
-            normals: (feature.kind == Kind::Corner)
+            normals: (feature.kind == FeatureKind::Corner)
                 .then(|| normals_at(&place, planes, near))
                 .flatten(),
         }
@@ -86,18 +86,18 @@ impl Landmark {
     /// Whether it has a position and an outward direction: two such landmarks determine a motion.
     pub fn is_located(&self) -> bool {
         let has_place = match self.kind {
-            Kind::Hole | Kind::Slot | Kind::Pocket | Kind::Boss => true,
+            FeatureKind::Hole | FeatureKind::Slot | FeatureKind::Pocket | FeatureKind::Boss => true,
             // the place of a step is on its shoulder, that of another is somewhere on its axis
-            Kind::Cylinder => self.is_step,
+            FeatureKind::Cylinder => self.is_step,
             _ => false,
         };
         has_place && self.axis.is_some()
     }
 
     /// Its kind; pockets count as slots, as their border is a matter of taste.
-    pub fn class(&self) -> Kind {
-        if self.kind == Kind::Pocket {
-            Kind::Slot
+    pub fn class(&self) -> FeatureKind {
+        if self.kind == FeatureKind::Pocket {
+            FeatureKind::Slot
         } else {
             self.kind
         }
@@ -119,11 +119,11 @@ impl Landmark {
     /// Its weight: an opening is one thing, an edge part of many.
     pub fn weight(&self) -> f64 {
         match self.kind {
-            Kind::Hole | Kind::Slot | Kind::Pocket | Kind::Boss => 1.0,
-            Kind::Corner => 0.5,
-            Kind::Edge => 0.25,
-            Kind::Cylinder if self.is_step => 1.0,
-            Kind::Plane | Kind::Cylinder | Kind::Notch => 0.2,
+            FeatureKind::Hole | FeatureKind::Slot | FeatureKind::Pocket | FeatureKind::Boss => 1.0,
+            FeatureKind::Corner => 0.5,
+            FeatureKind::Edge => 0.25,
+            FeatureKind::Cylinder if self.is_step => 1.0,
+            FeatureKind::Plane | FeatureKind::Cylinder | FeatureKind::Notch => 0.2,
         }
     }
 
@@ -162,7 +162,7 @@ impl Landmark {
         let along = offset.dot(&theirs);
         let across = (offset - theirs * along).norm();
         let left = match self.kind {
-            Kind::Plane => along.abs(),
+            FeatureKind::Plane => along.abs(),
             _ if !is_free => offset.norm(),
             _ => across.hypot((-along - other.span[0]).max(along - other.span[1]).max(0.0)),
         };
@@ -170,13 +170,13 @@ impl Landmark {
     }
 
     fn is_line(&self) -> bool {
-        self.is_through || self.kind == Kind::Edge
+        self.is_through || self.kind == FeatureKind::Edge
     }
 
     /// Projection onto the constrained offsets from `other`.
     pub fn held(&self, other: &Self) -> Matrix3<f64> {
         match other.axis {
-            Some(axis) if self.kind == Kind::Plane => axis * axis.transpose(),
+            Some(axis) if self.kind == FeatureKind::Plane => axis * axis.transpose(),
             Some(axis) if self.is_line() || other.is_line() => {
                 Matrix3::identity() - axis * axis.transpose()
             }

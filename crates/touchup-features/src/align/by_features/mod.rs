@@ -24,7 +24,7 @@ use nalgebra::{Isometry3, Point3};
 
 use self::alternative::SAME;
 use self::bases::{Base, SortedSets, axial_bases, bases};
-use self::judge::{Judge, Judged};
+use self::judge::{Judge, JudgedMotion};
 use self::landmark::{Landmark, landmarks};
 use self::matching::Matching;
 use crate::features::Feature;
@@ -97,7 +97,7 @@ pub fn align_features(
         ))
         .into_iter()
         .next();
-    let is_clear = |best: &Judged| match best.agreeing() {
+    let is_clear = |best: &JudgedMotion| match best.agreeing() {
         Some(share) => share >= LEAST_AGREEING,
         None if frames.is_axial => best.explained().count() == source.len(),
         None => best.weight(&judge.matching) >= LEAST_EXPLAINED,
@@ -133,10 +133,10 @@ pub fn align_features(
 /// Reason to refuse the best motion.
 fn refusal(
     judge: &Judge<'_>,
-    best: Option<&Judged>,
-    mirrored: Option<&Judged>,
+    best: Option<&JudgedMotion>,
+    mirrored: Option<&JudgedMotion>,
     of: usize,
-    is_clear: impl Fn(&Judged) -> bool,
+    is_clear: impl Fn(&JudgedMotion) -> bool,
 ) -> Option<FeaturesError> {
     let explained = best.map_or(0, |best| best.explained().count());
     if let Some(mirrored) = mirrored.filter(|mirrored| is_clear(mirrored))
@@ -152,7 +152,7 @@ fn refusal(
     (!is_believed).then(|| FeaturesError::NoMatch {
         explained,
         of,
-        agreeing: best.and_then(Judged::agreeing),
+        agreeing: best.and_then(JudgedMotion::agreeing),
     })
 }
 

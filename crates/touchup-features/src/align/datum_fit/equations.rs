@@ -6,7 +6,7 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector, Isometry3, Point3, UnitQuaternion, Vector3, Vector6};
 
 use super::pair::DatumPair;
-use crate::features::Kind;
+use crate::features::FeatureKind;
 use touchup_geometry::numeric::{point_to_plane_row, tangent_basis};
 
 /// Lower bound of standard uncertainties, m.
@@ -28,7 +28,7 @@ pub(super) struct Equations {
 ///
 /// - `arm`: from the centre of the turn.
 pub(super) fn place_rows(
-    kind: Kind,
+    kind: FeatureKind,
     axis: &Vector3<f64>,
     arm: &Vector3<f64>,
     lever: f64,
@@ -39,8 +39,8 @@ pub(super) fn place_rows(
         .collect()
 }
 
-fn place_directions(kind: Kind, axis: &Vector3<f64>) -> Vec<Vector3<f64>> {
-    if kind == Kind::Plane {
+fn place_directions(kind: FeatureKind, axis: &Vector3<f64>) -> Vec<Vector3<f64>> {
+    if kind == FeatureKind::Plane {
         vec![*axis]
     } else {
         tangent_basis(axis).to_vec()
@@ -79,7 +79,7 @@ impl Equations {
             let places = all.len() - first;
             if let Some((nominal, std)) = pair.nominal_axis.zip(pair.axis_std) {
                 // the sign of an axis does not matter, the side of a plane does
-                let is_turned = pair.kind != Kind::Plane && axis.dot(&nominal) < 0.0;
+                let is_turned = pair.kind != FeatureKind::Plane && axis.dot(&nominal) < 0.0;
                 let axis = if is_turned { -axis } else { axis };
                 let needed = turn_between(&axis, &nominal);
                 all.extend(tangent_basis(&axis).iter().map(|about| {

@@ -24,7 +24,7 @@ use self::equations::Equations;
 pub use self::error::DatumFitError;
 pub use self::pair::DatumPair;
 use self::solution::Solution;
-use crate::features::Kind;
+use crate::features::FeatureKind;
 use touchup_geometry::numeric::{mean, moved_by_twist};
 
 /// A motion into the frame of a drawing, and its uncertainty.
@@ -166,7 +166,13 @@ impl DatumFit {
     ///
     /// - `place`, `axis`: in the frame of the drawing; the place in m.
     /// - `std`: own uncertainty of the feature.
-    pub fn place_std(&self, kind: Kind, place: &Point3<f64>, axis: &Vector3<f64>, std: f64) -> f64 {
+    pub fn place_std(
+        &self,
+        kind: FeatureKind,
+        place: &Point3<f64>,
+        axis: &Vector3<f64>,
+        std: f64,
+    ) -> f64 {
         let rows = equations::place_rows(kind, axis, &(place - self.centre), 1.0);
         let of_frame: f64 = rows
             .iter()

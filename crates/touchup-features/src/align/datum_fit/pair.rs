@@ -2,13 +2,13 @@
 
 use nalgebra::{Point3, Vector3};
 
-use crate::features::Kind;
+use crate::features::FeatureKind;
 
 /// A measured feature and its nominal counterpart.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DatumPair {
     /// kind of both
-    pub kind: Kind,
+    pub kind: FeatureKind,
     /// nominal centre, m, in the frame of the drawing
     pub nominal: Point3<f64>,
     /// nominal axis or outward normal, unit vector

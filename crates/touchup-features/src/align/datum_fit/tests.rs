@@ -10,14 +10,18 @@ use super::*;
 fn plate(motion: &Isometry3<f64>) -> Vec<DatumPair> {
     let up = Vector3::z();
     let features = [
-        (Kind::Plane, Point3::new(0.030, 0.025, 0.012), up),
-        (Kind::Hole, Point3::new(0.016, 0.036, 0.012), up),
-        (Kind::Hole, Point3::new(0.052, 0.010, 0.012), up),
-        (Kind::Boss, Point3::new(0.047, 0.025, 0.012), up),
-        (Kind::Plane, Point3::new(0.060, 0.025, 0.006), Vector3::x()),
+        (FeatureKind::Plane, Point3::new(0.030, 0.025, 0.012), up),
+        (FeatureKind::Hole, Point3::new(0.016, 0.036, 0.012), up),
+        (FeatureKind::Hole, Point3::new(0.052, 0.010, 0.012), up),
+        (FeatureKind::Boss, Point3::new(0.047, 0.025, 0.012), up),
+        (
+            FeatureKind::Plane,
+            Point3::new(0.060, 0.025, 0.006),
+            Vector3::x(),
+        ),
     ];
     let inverse = motion.inverse();
-    let pair = |(kind, nominal, axis): (Kind, Point3<f64>, Vector3<f64>)| DatumPair {
+    let pair = |(kind, nominal, axis): (FeatureKind, Point3<f64>, Vector3<f64>)| DatumPair {
         kind,
         nominal,
         nominal_axis: Some(axis),
@@ -77,7 +81,7 @@ fn the_motion_of_a_part_as_drawn_is_found_by_best_fit_and_by_datums() {
 fn datums_count_in_their_order() {
     let lean: f64 = 0.01;
     let plane = |nominal: Point3<f64>, axis: Vector3<f64>, measured_axis: Vector3<f64>| DatumPair {
-        kind: Kind::Plane,
+        kind: FeatureKind::Plane,
         nominal,
         nominal_axis: Some(axis),
         measured: nominal,
@@ -133,12 +137,16 @@ fn uncertainties_are_those_of_repeated_measurements() {
             let mut pairs = exact.clone();
             for (pair, std) in pairs.iter_mut().zip(own) {
                 pair.place_std = std;
-                let count: f64 = if pair.kind == Kind::Plane { 1.0 } else { 2.0 };
+                let count: f64 = if pair.kind == FeatureKind::Plane {
+                    1.0
+                } else {
+                    2.0
+                };
                 let share = std / count.sqrt();
                 let across = Vector3::new(gauss(share), gauss(share), gauss(share));
                 let axis = pair.measured_axis;
                 let along = axis * axis.dot(&across);
-                pair.measured += if pair.kind == Kind::Plane {
+                pair.measured += if pair.kind == FeatureKind::Plane {
                     along
                 } else {
                     across - along
@@ -181,7 +189,7 @@ fn uncertainties_are_those_of_repeated_measurements() {
                 "{stages:?}, {at}: {found} and {std} m"
             );
         }
-        let side = stated.place_std(Kind::Plane, &exact[4].nominal, &Vector3::x(), own[4]);
+        let side = stated.place_std(FeatureKind::Plane, &exact[4].nominal, &Vector3::x(), own[4]);
         assert!(
             (side / stated.place_stds[4] - 1.0).abs() < 1e-3,
             "the same by both ways: {side} m"

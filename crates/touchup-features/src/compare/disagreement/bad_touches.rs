@@ -5,7 +5,7 @@ use nalgebra::{Point3, Vector3};
 use super::places::{Class, RefinedShape};
 use crate::compare::CompareError;
 use crate::compare::deviation::{at_closest_places, signed};
-use touchup_geometry::mesh::{Alone, FaceHit};
+use touchup_geometry::mesh::{FaceHit, SerialWorkers};
 use touchup_geometry::numeric::{PointGrid, median};
 use touchup_method::stylus::ProbedPoint;
 
@@ -156,7 +156,7 @@ fn distances(
     let mesh = refined.shape.mesh;
     let centres: Vec<Point3<f64>> = touches.iter().map(|touch| touch.centre).collect();
     let foot = |centre: &Point3<f64>, hit: &FaceHit| (signed(centre, mesh, hit), hit.point);
-    let feet = at_closest_places(&centres, mesh, refined.shape.tree, &Alone, foot)?;
+    let feet = at_closest_places(&centres, mesh, refined.shape.tree, &SerialWorkers, foot)?;
     Ok(feet
         .into_iter()
         .zip(touches)

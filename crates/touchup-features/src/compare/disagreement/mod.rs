@@ -19,7 +19,7 @@ use nalgebra::Point3;
 
 pub use self::bad_touches::BadTouches;
 use self::edges::SharpEdges;
-use self::places::Places;
+use self::places::VertexProperties;
 pub use self::places::{Class, RefinedShape, VertexBasis};
 pub use self::regions::{DisagreementRegion, RegionEvidence};
 pub use self::rigid_offset::RigidOffset;
@@ -27,7 +27,7 @@ pub use self::scanner::Scanner;
 use super::deviation::{at_closest_places, closest_places, signed};
 use super::sampling::nearest_corner;
 use super::{CompareError, IndexedMesh};
-use touchup_geometry::mesh::{Alone, FaceHit, TriMesh, VertexId};
+use touchup_geometry::mesh::{FaceHit, SerialWorkers, TriMesh, VertexId};
 use touchup_method::stylus::ProbedPoint;
 
 /// A mesh with its classes.
@@ -83,7 +83,7 @@ pub fn disagreement(
     if refined.shape.mesh.face_count() == 0 {
         return Err(CompareError::NoFaces);
     }
-    let mut places = Places::of(scan, refined)?;
+    let mut places = VertexProperties::of(scan, refined)?;
     let mut off = places.off.clone();
     let mut scanner = Scanner::of(&places);
     let mut rigid_offset = None;
@@ -126,7 +126,7 @@ pub fn disagreement(
     })
 }
 
-impl Places {
+impl VertexProperties {
     fn of(scan: IndexedMesh<'_>, refined: &RefinedShape<'_>) -> Result<Self, CompareError> {
         let mesh = refined.shape.mesh;
         let mut off = vec![0.0; mesh.vertex_slots()];
@@ -278,7 +278,7 @@ fn carried(
         mesh.positions(),
         refined.shape.mesh,
         refined.shape.tree,
-        &Alone,
+        &SerialWorkers,
         place,
     )?;
     let (off, carried) = places.into_iter().unzip();

@@ -55,7 +55,7 @@ impl Class {
 }
 
 /// Properties of each vertex of the refined mesh beside its class.
-pub(super) struct Places {
+pub(super) struct VertexProperties {
     /// m, by slot
     pub positions: Vec<Point3<f64>>,
     /// distance outside of the scan, m, by slot; without the rigid offset, once known
@@ -76,7 +76,7 @@ pub(super) struct Places {
     pub areas: Vec<f64>,
 }
 
-impl Places {
+impl VertexProperties {
     /// Indices of places that the scanner sees well.
     pub fn open(&self) -> Vec<usize> {
         (0..self.off.len()).filter(|&at| self.is_open[at]).collect()

@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::places::{Class, Places, RefinedShape};
+use super::places::{Class, RefinedShape, VertexProperties};
 use super::scanner::Scanner;
 use touchup_geometry::mesh::{TriMesh, VertexId};
 use touchup_geometry::numeric::{PointGrid, flood};
@@ -42,7 +42,7 @@ pub struct DisagreementRegion {
 /// Inputs of the search for regions.
 pub(super) struct RegionInput<'a> {
     pub refined: &'a RefinedShape<'a>,
-    pub places: &'a Places,
+    pub places: &'a VertexProperties,
     pub scanner: &'a Scanner,
     pub touches: &'a [ProbedPoint],
 }
@@ -93,13 +93,13 @@ pub(super) fn find(seen: &RegionInput<'_>, classes: &mut [Class]) -> Vec<Disagre
 
 /// Whether a disagreement is evidence of a change, not of limited visibility: the scan too low,
 /// `side` 0, or too high, 1.
-fn is_evidence(places: &Places, at: usize, side: usize) -> bool {
+fn is_evidence(places: &VertexProperties, at: usize, side: usize) -> bool {
     places.is_open[at] || (places.is_wide[at] && !places.may_be[at][side])
 }
 
 /// Means over the surroundings, m, by slot: for open places over open ones, for others over all
 /// wide ones.
-fn smoothed(mesh: &TriMesh, places: &Places, scanner: &Scanner) -> Vec<f64> {
+fn smoothed(mesh: &TriMesh, places: &VertexProperties, scanner: &Scanner) -> Vec<f64> {
     let reach = scanner.correlation / 2.0;
     let cells = |is_own: &[bool]| {
         PointGrid::of(
@@ -140,7 +140,7 @@ fn neighbours(mesh: &TriMesh, at: usize) -> impl Iterator<Item = usize> + '_ {
 }
 
 /// Area, m², and mean of touch − scan, m, of some places.
-fn mean_of(places: &Places, own: impl Iterator<Item = usize>) -> (f64, f64) {
+fn mean_of(places: &VertexProperties, own: impl Iterator<Item = usize>) -> (f64, f64) {
     let (area, sum) = own.fold((0.0, 0.0), |(area, sum), at| {
         (
             area + places.areas[at],
@@ -235,7 +235,7 @@ fn passes(touches: &[ProbedPoint], region: &PointGrid, reach: f64) -> usize {
 }
 
 /// Share of the places at the rim of a region with an edge nearby.
-fn rim_at_edges(mesh: &TriMesh, places: &Places, all: &[usize], is_own: &[bool]) -> f64 {
+fn rim_at_edges(mesh: &TriMesh, places: &VertexProperties, all: &[usize], is_own: &[bool]) -> f64 {
     let rim: Vec<usize> = all
         .iter()
         .copied()

@@ -9,7 +9,7 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Matrix6, Point3, SMatrix, SVector, Vector3, Vector6};
 
-use super::places::Places;
+use super::places::VertexProperties;
 use super::scanner::Scanner;
 use touchup_geometry::numeric::{
     NormalEquations, SIGMA_OF_MEDIAN, TUKEY_WIDTH, biweight, centroid_and_spread, median,
@@ -60,7 +60,7 @@ pub(super) struct OffsetFit {
 
 impl OffsetFit {
     /// Fits the open places; `None` if they determine nothing.
-    pub fn of(places: &Places) -> Option<Self> {
+    pub fn of(places: &VertexProperties) -> Option<Self> {
         let open = places.open();
         let (centre, lever) = centroid_and_spread(open.iter().map(|&at| &places.positions[at]));
         let row = |&at: &usize| {

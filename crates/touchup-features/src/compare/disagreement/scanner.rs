@@ -1,7 +1,7 @@
 //! Error model of the scanner, from scan and touch alone.
 
 use super::edges::SHARP;
-use super::places::Places;
+use super::places::VertexProperties;
 use touchup_geometry::numeric::{SIGMA_OF_MEDIAN, median};
 
 /// Error of the scanner at places that it should see well.
@@ -39,7 +39,7 @@ const LEAST_NOISE: f64 = 1e-3;
 
 impl Scanner {
     /// `None` if too few places are open.
-    pub(super) fn of(places: &Places) -> Option<Self> {
+    pub(super) fn of(places: &VertexProperties) -> Option<Self> {
         let open = places.open();
         if open.len() < FEWEST {
             return None;
@@ -81,7 +81,7 @@ impl Scanner {
 
 /// Correlation length of disagreements, m: half the mean square of their differences grows to 1 −
 /// 1/e of the variance within √2 ℓ.
-fn correlation(places: &Places, open: &[usize], noise: f64, edge: f64) -> f64 {
+fn correlation(places: &VertexProperties, open: &[usize], noise: f64, edge: f64) -> f64 {
     let some: Vec<usize> = open
         .iter()
         .copied()

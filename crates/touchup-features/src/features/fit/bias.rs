@@ -19,9 +19,9 @@ use nalgebra::Vector3;
 
 use super::solver::FitProblem;
 use super::uncertainty::SPARE_GROUPS;
-use super::{Fit, Surface};
+use super::{Fit, SurfaceModel};
 
-impl<M: Surface> Fit<M> {
+impl<M: SurfaceModel> Fit<M> {
     /// b of each observation, m, for the error level of the residuals.
     pub(super) fn bias(&self, problem: &FitProblem) -> Vec<f64> {
         let surface = &self.surface;

@@ -5,7 +5,7 @@ use std::f64::consts::FRAC_PI_2;
 use nalgebra::{Isometry3, Point3, Translation3, Vector3};
 
 use super::surface::{AXIS, CENTRE, RADIUS, check_size, pose_along, radial, side};
-use super::{Distance, FREEDOMS, FitError, Surface};
+use super::{Distance, FREEDOMS, FitError, SurfaceModel};
 use touchup_geometry::numeric::mean;
 
 /// A cone, by one of its circles and the angle between its lines and its axis.
@@ -50,7 +50,7 @@ impl Cone {
     }
 }
 
-impl Surface for Cone {
+impl SurfaceModel for Cone {
     const NAMES: [Option<&'static str>; FREEDOMS] = [
         CENTRE,
         CENTRE,

@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Point3, Translation3, Vector3};
 
 use super::surface::{AXIS, CENTRE, RADIUS, check_size, pose_along, radial, side};
-use super::{Distance, FREEDOMS, Fit, FitError, Surface};
+use super::{Distance, FREEDOMS, Fit, FitError, SurfaceModel};
 use touchup_geometry::numeric::mean;
 
 /// Bound on the squared sine between a direction and the axis for parallelism: rounding level.
@@ -31,7 +31,7 @@ impl Cylinder {
     }
 }
 
-impl Surface for Cylinder {
+impl SurfaceModel for Cylinder {
     const NAMES: [Option<&'static str>; FREEDOMS] =
         [CENTRE, CENTRE, None, AXIS, AXIS, None, RADIUS, None];
 

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Point3, Vector3};
 
 use super::solver::FreedomMatrix;
-use super::{Freedom, Observation, Steps, Surface};
+use super::{Freedom, Observation, Steps, SurfaceModel};
 
 /// Maximum share of a direction in undetermined ones if it is determined; roundings of the
 /// eigenvectors stay far below.
@@ -38,7 +38,7 @@ pub struct Fit<M> {
     pub(super) deviations: FreedomMatrix,
 }
 
-impl<M: Surface> Fit<M> {
+impl<M: SurfaceModel> Fit<M> {
     /// Root mean square residual of the kept observations, m.
     pub(crate) fn unevenness(&self, observations: &[Observation]) -> f64 {
         let used = observations

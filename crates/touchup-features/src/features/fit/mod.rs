@@ -1,7 +1,7 @@
 //! Least squares fits of planes, cylinders, cones and slots to touches or a mesh, with a reliable
 //! uncertainty.
 //!
-//! A surface has a pose and up to two sizes; [`Surface`] names its share of these eight
+//! A surface has a pose and up to two sizes; [`SurfaceModel`] names its share of these eight
 //! [`Freedom`]s. The fit minimises Σ wᵢ (dᵢ − oᵢ)² over the observations it keeps: dᵢ the signed
 //! distance of a point from the surface, oᵢ its nominal offset. The centre of a touching ball is at
 //! its radius from the surface, whatever the direction of the force: fitting centres to the offset
@@ -37,4 +37,4 @@ pub use robust::fit;
 pub(crate) use robust::fit_mesh;
 pub use stadium::from_segment;
 pub use stadium::{Ends, Stadium};
-pub use surface::{Distance, FREEDOMS, Freedom, Steps, Surface};
+pub use surface::{Distance, FREEDOMS, Freedom, Steps, SurfaceModel};

@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::surface::pose_along;
-use super::{Distance, FREEDOMS, FitError, Surface};
+use super::{Distance, FREEDOMS, FitError, SurfaceModel};
 use touchup_geometry::numeric::mean;
 
 const NORMAL: Option<&str> = Some("direction of the normal");
@@ -41,7 +41,7 @@ impl Plane {
     }
 }
 
-impl Surface for Plane {
+impl SurfaceModel for Plane {
     const NAMES: [Option<&'static str>; FREEDOMS] = [
         None,
         None,

@@ -1,7 +1,7 @@
 //! Robust fit: three rounds of regression that reject observations off the surface.
 
 use super::solver::FitProblem;
-use super::{Fit, FitError, FitParams, Observation, Surface};
+use super::{Fit, FitError, FitParams, Observation, SurfaceModel};
 use touchup_geometry::numeric::{SIGMA_OF_MEDIAN, TUKEY_WIDTH, biweight, median};
 
 /// Maximum number of weight updates in one round; the weights converge long before.
@@ -25,7 +25,7 @@ const DEBIASINGS: usize = 2;
 ///
 /// # Errors
 /// [`FitError`]; on NaN, too few observations, and an undetermined needed freedom.
-pub fn fit<M: Surface>(
+pub fn fit<M: SurfaceModel>(
     guess: &M,
     observations: &[Observation],
     params: &FitParams,
@@ -62,7 +62,7 @@ pub fn fit<M: Surface>(
 ///
 /// # Errors
 /// As [`fit`].
-pub(crate) fn fit_mesh<M: Surface>(
+pub(crate) fn fit_mesh<M: SurfaceModel>(
     guess: &M,
     observations: &[Observation],
     params: &FitParams,
@@ -80,7 +80,7 @@ pub(crate) fn fit_mesh<M: Surface>(
 }
 
 /// Refuses fewer observations than unknowns, and observations of one group alone.
-fn enough<M: Surface>(problem: &FitProblem, kept: &[f64]) -> Result<(), FitError> {
+fn enough<M: SurfaceModel>(problem: &FitProblem, kept: &[f64]) -> Result<(), FitError> {
     let have = kept.iter().filter(|k| **k > 0.0).count();
     let known = if problem.known_axis.is_some() { 2 } else { 0 };
     let unknowns = M::freedom_count() - known;
@@ -111,7 +111,7 @@ fn tukey(z: f64) -> f64 {
 }
 
 /// Scale of normalised residuals, at least 1: from the median of all, as half of them are good.
-fn scale<M: Surface>(z: &[f64]) -> f64 {
+fn scale<M: SurfaceModel>(z: &[f64]) -> f64 {
     let mut sizes: Vec<f64> = z.iter().map(|z| z.abs()).collect();
     let freedom = z.len() as f64 / (z.len().saturating_sub(M::freedom_count())).max(1) as f64;
     (SIGMA_OF_MEDIAN * median(&mut sizes).unwrap_or(0.0) * freedom.sqrt()).max(1.0)
@@ -119,7 +119,7 @@ fn scale<M: Surface>(z: &[f64]) -> f64 {
 
 /// Alternates steps and weights until both converge. No convergence is no error: the next round
 /// goes on from there.
-fn reweighted<M: Surface>(problem: &FitProblem, mut surface: M, weight: fn(f64) -> f64) -> M {
+fn reweighted<M: SurfaceModel>(problem: &FitProblem, mut surface: M, weight: fn(f64) -> f64) -> M {
     let mut before = vec![0.0; problem.observations.len()];
     for _ in 0..MOST_UPDATES {
         let z = problem.normalised(&surface);
@@ -141,7 +141,7 @@ fn reweighted<M: Surface>(problem: &FitProblem, mut surface: M, weight: fn(f64) 
 
 /// Least squares with rejection of outliers, until the kept set repeats; also returns that set (1,
 /// others 0).
-fn rejected<M: Surface>(
+fn rejected<M: SurfaceModel>(
     problem: &FitProblem,
     mut surface: M,
     rejection: f64,

@@ -2,7 +2,7 @@
 
 use nalgebra::{SMatrix, Vector3};
 
-use super::{FREEDOMS, FitError, FitParams, Observation, Steps, Surface};
+use super::{FREEDOMS, FitError, FitParams, Observation, Steps, SurfaceModel};
 use touchup_geometry::numeric::{
     DampedSearch, NormalEquations, SearchEnd, centroid_and_spread, distinct,
 };
@@ -62,7 +62,7 @@ impl<'a> FitProblem<'a> {
     }
 
     /// Size of a scaled step of 1 in each freedom: `size` for lengths, 1 rad for angles.
-    pub fn units<M: Surface>(&self) -> Steps {
+    pub fn units<M: SurfaceModel>(&self) -> Steps {
         let second = if M::SECOND_IS_LENGTH { self.size } else { 1.0 };
         Steps::from([
             self.size, self.size, self.size, 1.0, 1.0, 1.0, self.size, second,
@@ -70,12 +70,12 @@ impl<'a> FitProblem<'a> {
     }
 
     /// Distance less offset and shift, m.
-    pub fn residual<M: Surface>(&self, surface: &M, i: usize) -> f64 {
+    pub fn residual<M: SurfaceModel>(&self, surface: &M, i: usize) -> f64 {
         surface.distance(&self.observations[i].point) - self.observations[i].offset - self.shift[i]
     }
 
     /// All residuals in their own standard deviations.
-    pub fn normalised<M: Surface>(&self, surface: &M) -> Vec<f64> {
+    pub fn normalised<M: SurfaceModel>(&self, surface: &M) -> Vec<f64> {
         (0..self.observations.len())
             .map(|i| self.residual(surface, i) / self.observations[i].sigma)
             .collect()
@@ -96,7 +96,11 @@ impl<'a> FitProblem<'a> {
     }
 
     /// Normal equations of the residuals around a surface: a scaled step is minus their solution.
-    pub fn equations<M: Surface>(&self, surface: &M, weights: &[f64]) -> NormalEquations<FREEDOMS> {
+    pub fn equations<M: SurfaceModel>(
+        &self,
+        surface: &M,
+        weights: &[f64],
+    ) -> NormalEquations<FREEDOMS> {
         let units = self.units::<M>();
         let mut sum = self.prior(surface);
         let own = surface.to_own();
@@ -110,8 +114,8 @@ impl<'a> FitProblem<'a> {
 
     /// Equations of the prior axis: seen from F it leans by −a, a its own x and y.
     ///
-    /// Turning F by ω takes a from a to a + a × ω, ω as in [`Surface::derivatives`].
-    pub fn prior<M: Surface>(&self, surface: &M) -> NormalEquations<FREEDOMS> {
+    /// Turning F by ω takes a from a to a + a × ω, ω as in [`SurfaceModel::derivatives`].
+    pub fn prior<M: SurfaceModel>(&self, surface: &M) -> NormalEquations<FREEDOMS> {
         let mut sum = NormalEquations::default();
         if let Some((axis, sigma)) = self.known_axis {
             let known = surface.pose_of().inverse_transform_vector(&axis);
@@ -126,7 +130,7 @@ impl<'a> FitProblem<'a> {
         sum
     }
 
-    fn cost<M: Surface>(&self, surface: &M, weights: &[f64]) -> f64 {
+    fn cost<M: SurfaceModel>(&self, surface: &M, weights: &[f64]) -> f64 {
         let of_points = |(i, w): (usize, &f64)| {
             if *w > 0.0 {
                 w * self.residual(surface, i).powi(2)
@@ -139,7 +143,7 @@ impl<'a> FitProblem<'a> {
 
     /// Takes steps that do not raise the cost, until one is shorter than `last` standard
     /// deviations.
-    fn search<M: Surface>(
+    fn search<M: SurfaceModel>(
         &self,
         search: &DampedSearch,
         surface: M,
@@ -175,7 +179,7 @@ impl<'a> FitProblem<'a> {
     }
 
     /// Takes one step that does not raise the cost, if any.
-    pub fn step<M: Surface>(&self, surface: M, weights: &[f64]) -> M {
+    pub fn step<M: SurfaceModel>(&self, surface: M, weights: &[f64]) -> M {
         self.search(
             &DampedSearch {
                 first: 1e-6,
@@ -192,7 +196,7 @@ impl<'a> FitProblem<'a> {
     ///
     /// # Errors
     /// [`FitError::NotConverged`].
-    pub fn solve<M: Surface>(&self, surface: M, weights: &[f64]) -> Result<M, FitError> {
+    pub fn solve<M: SurfaceModel>(&self, surface: M, weights: &[f64]) -> Result<M, FitError> {
         match self.search(&SEARCH, surface, weights, SETTLED) {
             (_, SearchEnd::Unsettled) => Err(FitError::NotConverged {
                 iterations: MOST_STEPS,
@@ -202,7 +206,7 @@ impl<'a> FitProblem<'a> {
     }
 
     /// The same surface with its frame amid the kept observations, at least one.
-    pub fn described<M: Surface>(&self, surface: &M, kept: &[f64]) -> M {
+    pub fn described<M: SurfaceModel>(&self, surface: &M, kept: &[f64]) -> M {
         let is_kept = self
             .observations
             .iter()

@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Point3, Translation3, Vector3};
 
 use super::surface::{AXIS, check_size, pose_along, side};
-use super::{Distance, FREEDOMS, Fit, FitError, Freedom, Surface};
+use super::{Distance, FREEDOMS, Fit, FitError, Freedom, SurfaceModel};
 use touchup_geometry::numeric::mean;
 
 /// Minimum share of the normal along the slot for a touch to determine an end: 30° from the wall.
@@ -122,7 +122,7 @@ impl Stadium {
     }
 }
 
-impl Surface for Stadium {
+impl SurfaceModel for Stadium {
     const NAMES: [Option<&'static str>; FREEDOMS] = [
         Some("centre along the slot"),
         Some("centre across the slot"),

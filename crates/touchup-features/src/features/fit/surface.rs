@@ -58,7 +58,7 @@ pub struct Distance {
 }
 
 /// A surface that [`super::fit`] can fit.
-pub trait Surface: Clone {
+pub trait SurfaceModel: Clone {
     /// Names of its freedoms in errors; `None`: it lacks the freedom.
     const NAMES: [Option<&'static str>; FREEDOMS];
     /// Its freedoms.

@@ -3,7 +3,7 @@
 use nalgebra::SymmetricEigen;
 
 use super::solver::{FitProblem, FreedomMatrix};
-use super::{Fit, FitError, FitParams, Freedom, Steps, Surface};
+use super::{Fit, FitError, FitParams, Freedom, Steps, SurfaceModel};
 
 /// Maximum deviation of a determined direction: the size of the touched area, or 1 rad (both are 1
 /// in scaled steps).
@@ -14,7 +14,7 @@ const LEAST_SHARE: f64 = 1e-12;
 /// Number of groups beyond the unknowns from which on the residuals give the size of the errors.
 pub(super) const SPARE_GROUPS: usize = 3;
 
-impl<M: Surface> Fit<M> {
+impl<M: SurfaceModel> Fit<M> {
     /// Covariance around a surface of least squares over the kept observations.
     ///
     /// In steps y of one stated standard deviation along the fixed directions the stated covariance

@@ -10,7 +10,7 @@ use nalgebra::Point3;
 
 use super::aabb::{Aabb, greater, lesser};
 use super::{FaceTree, Item, LEAF_FACES, NONE, ROOT, SiblingNodes, TreeNode};
-use crate::mesh::{Alone, FaceId, Job, TriMesh, Workers};
+use crate::mesh::{FaceId, SerialWorkers, Task, TriMesh, Workers};
 use crate::numeric::largest;
 
 /// Smallest share (1/4) on either side of a split at the middle; else the split is by count.
@@ -24,7 +24,7 @@ const LEAST_FORKED: usize = 20_000;
 impl FaceTree {
     /// Builds the tree; O(F log F).
     pub fn new(mesh: &TriMesh) -> Self {
-        Self::new_by(mesh, &Alone)
+        Self::new_by(mesh, &SerialWorkers)
     }
 
     /// [`Self::new`] by `workers`; the tree does not depend on them.
@@ -61,7 +61,7 @@ impl FaceTree {
                 leaf_of_face = blank(mesh.face_slots());
             }),
         ]);
-        let places = Places {
+        let places = SubtreeSlices {
             pairs: &mut pairs,
             parents: &mut parents,
             leaf_faces: &mut leaf_faces,
@@ -215,7 +215,7 @@ impl NodeStore for FaceTree {
 }
 
 /// The places of the nodes below one node, in order from the top down, left before right.
-struct Places<'a> {
+struct SubtreeSlices<'a> {
     pairs: &'a mut [SiblingNodes],
     parents: &'a mut [u32],
     leaf_faces: &'a mut [[FaceId; LEAF_FACES]],
@@ -226,9 +226,9 @@ struct Places<'a> {
     first_leaf: u32,
 }
 
-/// The unused rest of some [`Places`].
+/// The unused rest of some [`SubtreeSlices`].
 struct PlacesLeft<'a> {
-    all: Places<'a>,
+    all: SubtreeSlices<'a>,
     pairs: u32,
     leaves: u32,
 }
@@ -278,7 +278,7 @@ impl LeafOrder {
         let (lower, upper) = items.split_at_mut(left);
         let mut sides = Box::new([const { Self::Whole(Vec::new()) }; 2]);
         let work = sides.iter_mut().zip([lower, upper]).map(|(side, items)| {
-            Box::new(move || *side = Self::arrange(items, forks - 1, workers)) as Job<'_>
+            Box::new(move || *side = Self::arrange(items, forks - 1, workers)) as Task<'_>
         });
         workers.run(work.collect());
         Self::Forked(left, sides)
@@ -297,7 +297,7 @@ impl LeafOrder {
         &self,
         items: &[Item],
         boxes: &Boxes,
-        places: Places,
+        places: SubtreeSlices,
         at: u32,
         workers: &dyn Workers,
     ) -> TreeNode {
@@ -317,7 +317,7 @@ impl LeafOrder {
             }
             Self::Forked(left, sides) => (*left, sides),
         };
-        let Places {
+        let SubtreeSlices {
             pairs,
             parents,
             leaf_faces,
@@ -329,7 +329,7 @@ impl LeafOrder {
         let ((above, pairs), (parent, parents)) = (pairs.split_at_mut(1), parents.split_at_mut(1));
         let (pairs, parents) = (pairs.split_at_mut(below), parents.split_at_mut(below));
         let (leaf_faces, items) = (leaf_faces.split_at_mut(below + 1), items.split_at(left));
-        let lower = Places {
+        let lower = SubtreeSlices {
             pairs: pairs.0,
             parents: parents.0,
             leaf_faces: leaf_faces.0,
@@ -337,7 +337,7 @@ impl LeafOrder {
             first_pair: pair + 1,
             first_leaf,
         };
-        let upper = Places {
+        let upper = SubtreeSlices {
             pairs: pairs.1,
             parents: parents.1,
             leaf_faces: leaf_faces.1,
@@ -349,7 +349,7 @@ impl LeafOrder {
         let parts = [(items.0, lower, 2 * pair), (items.1, upper, 2 * pair + 1)];
         let work = nodes.iter_mut().zip(sides.iter()).zip(parts).map(
             |((node, side), (items, places, at))| {
-                Box::new(move || *node = side.grow(items, boxes, places, at, workers)) as Job<'_>
+                Box::new(move || *node = side.grow(items, boxes, places, at, workers)) as Task<'_>
             },
         );
         workers.run(work.collect());
@@ -450,7 +450,7 @@ mod tests {
     use nalgebra::Point3;
 
     use super::*;
-    use crate::mesh::workers::Backwards;
+    use crate::mesh::workers::ReversedWorkers;
 
     /// A wavy sheet with columns closer and closer, which makes splits at the middle lopsided;
     /// without every seventh face.
@@ -484,7 +484,7 @@ mod tests {
         for mesh in [sheet(300, 250), sheet(1, 1), sheet(1, 0)] {
             let alone = FaceTree::new(&mesh);
             for workers in 1..6 {
-                let tree = FaceTree::new_by(&mesh, &Backwards(workers));
+                let tree = FaceTree::new_by(&mesh, &ReversedWorkers(workers));
                 assert!(
                     format!("{tree:?}") == format!("{alone:?}"),
                     "{} faces by {workers}",
@@ -498,7 +498,7 @@ mod tests {
     fn a_tree_by_several_workers_finds_what_a_look_at_every_face_finds() {
         let mesh = sheet(120, 150);
         assert!(mesh.face_count() > LEAST_FORKED);
-        let tree = FaceTree::new_by(&mesh, &Backwards(3));
+        let tree = FaceTree::new_by(&mesh, &ReversedWorkers(3));
         for i in 0..40 {
             let p = Point3::new(0.025 * f64::from(i), 0.03 * f64::from(i), 0.05);
             let off = |face| {

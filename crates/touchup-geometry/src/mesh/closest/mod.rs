@@ -20,7 +20,7 @@ use nalgebra::Point3;
 use super::{FaceId, TriMesh};
 use aabb::Aabb;
 pub(super) use aabb::greater;
-pub use nearby::Nearby;
+pub use nearby::NearbyLeaves;
 pub use query::{BoxQuery, FaceHit};
 pub use refit::RefitPlan;
 

@@ -18,7 +18,7 @@ const EDGES_BEYOND: f64 = 0.7;
 
 /// The leaves of one tree that meet a ball, for [`FaceTree::closest_nearby`].
 #[derive(Clone, Debug)]
-pub struct Nearby {
+pub struct NearbyLeaves {
     leaves: Vec<u32>,
     centre: Point3<f64>,
     /// m; negative if nothing is stored
@@ -30,7 +30,7 @@ pub struct Nearby {
     crowded: Option<FaceId>,
 }
 
-impl Default for Nearby {
+impl Default for NearbyLeaves {
     fn default() -> Self {
         let leaves = Vec::with_capacity(MOST_LEAVES);
         Self {
@@ -55,7 +55,7 @@ impl FaceTree {
         p: &Point3<f64>,
         hint: FaceId,
         reach: f64,
-        nearby: &mut Nearby,
+        nearby: &mut NearbyLeaves,
     ) -> Option<FaceHit> {
         let triangle = mesh.triangle(hint);
         // a little farther, to include the hint itself; a touching point still has some reach
@@ -89,7 +89,7 @@ impl FaceTree {
     }
 
     /// Stores the leaves that meet the ball around `p`; returns whether they are few enough.
-    fn keep_near(&self, p: &Point3<f64>, radius: f64, nearby: &mut Nearby) -> bool {
+    fn keep_near(&self, p: &Point3<f64>, radius: f64, nearby: &mut NearbyLeaves) -> bool {
         let ball = SearchState::new(self, p, radius);
         (nearby.radius, nearby.crowded) = (-1.0, None);
         nearby.leaves.clear();
@@ -136,8 +136,8 @@ mod tests {
     #[test]
     fn leaves_are_kept_as_long_as_the_point_stays_near_and_no_box_can_have_come_near() {
         let mut mesh = plane(20);
-        let (mut tree, mut nearby) = (FaceTree::new(&mesh), Nearby::default());
-        let ask = |tree: &FaceTree, mesh: &TriMesh, x: f64, nearby: &mut Nearby| {
+        let (mut tree, mut nearby) = (FaceTree::new(&mesh), NearbyLeaves::default());
+        let ask = |tree: &FaceTree, mesh: &TriMesh, x: f64, nearby: &mut NearbyLeaves| {
             let p = Point3::new(x, 10.3, 0.01);
             let hit = tree.closest_nearby(mesh, &p, FaceId(420), f64::INFINITY, nearby);
             assert_eq!(hit, tree.closest(mesh, &p, f64::INFINITY));
@@ -190,7 +190,7 @@ mod tests {
             Point3::new(0.0, 1.0, 0.0),
         ];
         let mesh = TriMesh::new(corners, vec![[0, 1, 2]; 1000]).unwrap();
-        let (tree, mut nearby) = (FaceTree::new(&mesh), Nearby::default());
+        let (tree, mut nearby) = (FaceTree::new(&mesh), NearbyLeaves::default());
         for i in 0..4 {
             let p = Point3::new(0.2, 0.2, 0.1 * f64::from(i));
             let hit = tree.closest_nearby(&mesh, &p, FaceId(7), f64::INFINITY, &mut nearby);

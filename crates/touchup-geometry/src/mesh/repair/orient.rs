@@ -1,6 +1,6 @@
 //! The edges of a mesh, and consistent orientation of its faces.
 
-use super::pieces::{FaceSets, Numbered};
+use super::pieces::{FaceComponents, FaceSets};
 use crate::mesh::{FaceId, TriMesh, VertexId};
 use crate::numeric::distinct;
 
@@ -135,7 +135,7 @@ impl Edges {
 fn open_pieces(
     boundary: &[([u32; 2], u32)],
     crowded: &[(usize, u32, bool)],
-    pieces: &Numbered,
+    pieces: &FaceComponents,
 ) -> Vec<bool> {
     let mut open = vec![false; pieces.roots.len()];
     for &(_, face) in boundary {
@@ -156,7 +156,7 @@ fn open_pieces(
 }
 
 /// Parity of the faces to turn over, for each piece.
-fn turned_parities(mesh: &TriMesh, pieces: &Numbered, open: &[bool]) -> Vec<bool> {
+fn turned_parities(mesh: &TriMesh, pieces: &FaceComponents, open: &[bool]) -> Vec<bool> {
     // area of parity 0 less area of parity 1, or six times the volume as parity 0 sees it
     let mut balance = vec![0.0; open.len()];
     for face in 0..mesh.face_slots() as u32 {

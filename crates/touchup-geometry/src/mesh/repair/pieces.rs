@@ -55,7 +55,7 @@ impl FaceSets {
     }
 
     /// Numbers the sets in the order of their lowest faces.
-    pub fn number(self) -> Numbered {
+    pub fn number(self) -> FaceComponents {
         let (mut pieces, mut roots) = (self.parents, Vec::new());
         for face in 0..pieces.len() {
             let up = pieces[face];
@@ -67,19 +67,19 @@ impl FaceSets {
                 pieces[up as usize >> 1] ^ (up & 1)
             };
         }
-        Numbered { pieces, roots }
+        FaceComponents { pieces, roots }
     }
 }
 
-/// Numbered disjoint sets.
-pub(super) struct Numbered {
+/// Connected components of faces, numbered.
+pub(super) struct FaceComponents {
     /// number (31 bits) and parity against its root (1 bit) for each face
     pieces: Vec<u32>,
     /// the lowest face of each set
     pub roots: Vec<u32>,
 }
 
-impl Numbered {
+impl FaceComponents {
     /// Number of the set of a face.
     #[inline]
     pub fn piece(&self, face: u32) -> usize {

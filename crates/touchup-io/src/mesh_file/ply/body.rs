@@ -4,14 +4,14 @@ use nalgebra::Point3;
 
 use super::super::defect::{Defect, Syntax};
 use super::super::text::{NumberedLines, number};
-use super::header::{Element, Encoding, PlyHeader, PlyKind};
+use super::header::{PlyElement, PlyEncoding, PlyHeader, PlyKind};
 use crate::file_error::FilePlace;
 use crate::scalar::Scalar;
 
 /// The remaining body.
 pub(super) struct Body<'a> {
     bytes: &'a [u8],
-    encoding: Encoding,
+    encoding: PlyEncoding,
     end_of_line: u8,
     /// next byte
     at: usize,
@@ -38,7 +38,7 @@ impl<'a> Body<'a> {
     }
 
     /// Refuses an element with too few bytes for its rows: afterwards its count is safe for memory.
-    pub fn check_count(&self, element: &Element) -> Result<(), Syntax> {
+    pub fn check_count(&self, element: &PlyElement) -> Result<(), Syntax> {
         let place = FilePlace::Line(element.line);
         if element.count > 0 && element.properties.is_empty() {
             return Err(Syntax::unexpected(
@@ -67,14 +67,14 @@ impl<'a> Body<'a> {
     /// lines are skipped.
     pub fn rows(
         &mut self,
-        element: &Element,
+        element: &PlyElement,
         count: usize,
         list: Option<usize>,
         mut take: impl FnMut(&[f64], FilePlace) -> Result<(), Syntax>,
     ) -> Result<(), Syntax> {
         let mut row = Vec::new();
-        if self.encoding != Encoding::Ascii {
-            let (bytes, big) = (self.bytes, self.encoding == Encoding::Big);
+        if self.encoding != PlyEncoding::Ascii {
+            let (bytes, big) = (self.bytes, self.encoding == PlyEncoding::Big);
             for _ in 0..count {
                 let place = FilePlace::Byte(self.at as u64);
                 read_row(element, list, place, &mut row, |scalar| {
@@ -118,7 +118,7 @@ impl<'a> Body<'a> {
     /// reading, for lists, ASCII, or a file that ends before its last row.
     pub fn fixed_rows(
         &mut self,
-        element: &Element,
+        element: &PlyElement,
         columns: [usize; 3],
         scale: f64,
     ) -> Option<Vec<Point3<f64>>> {
@@ -134,11 +134,11 @@ impl<'a> Body<'a> {
         let rows = self
             .bytes
             .get(self.at..end)
-            .filter(|_| self.encoding != Encoding::Ascii)?
+            .filter(|_| self.encoding != PlyEncoding::Ascii)?
             .chunks_exact(len);
         self.at = end;
         let [x, y, z] = columns.map(|column| offsets[column]);
-        let big = self.encoding == Encoding::Big;
+        let big = self.encoding == PlyEncoding::Big;
         let column = |row: &[u8], (at, scalar): (usize, Scalar)| {
             scale * scalar.value(&row[at..], big).unwrap_or(f64::NAN)
         };
@@ -158,7 +158,7 @@ impl<'a> Body<'a> {
 
     /// The rows that are triangles in the usual layout (only a list of three 32-bit numbers, little
     /// endian), up to the first other row. Strips look the same and stay unread.
-    pub fn triangles(&mut self, element: &Element) -> Vec<[u32; 3]> {
+    pub fn triangles(&mut self, element: &PlyElement) -> Vec<[u32; 3]> {
         const ROW: usize = 13;
         let usual = |kind| {
             matches!(
@@ -171,7 +171,7 @@ impl<'a> Body<'a> {
         };
         let layout_is_usual =
             element.name == "face" && matches!(&element.properties[..], [only] if usual(only.kind));
-        if self.encoding != Encoding::Little || !layout_is_usual {
+        if self.encoding != PlyEncoding::Little || !layout_is_usual {
             return Vec::new();
         }
         let rows = self.bytes[self.at..].as_chunks::<ROW>().0;
@@ -192,7 +192,7 @@ impl<'a> Body<'a> {
 /// Fills `row` from `next`: the items of the list in column `list`, or else one value for each
 /// column.
 fn read_row(
-    element: &Element,
+    element: &PlyElement,
     list: Option<usize>,
     place: FilePlace,
     row: &mut Vec<f64>,

@@ -7,7 +7,7 @@ use crate::scalar::Scalar;
 
 /// Encoding of the body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Encoding {
+pub(super) enum PlyEncoding {
     Ascii,
     Little,
     Big,
@@ -25,8 +25,9 @@ pub(super) struct Property {
     pub kind: PlyKind,
 }
 
+/// An element of a PLY header: its count and properties.
 #[derive(Debug)]
-pub(super) struct Element {
+pub(super) struct PlyElement {
     pub name: String,
     pub count: usize,
     pub properties: Vec<Property>,
@@ -34,7 +35,7 @@ pub(super) struct Element {
     pub line: usize,
 }
 
-impl Element {
+impl PlyElement {
     /// Column of a scalar property.
     pub fn scalar(&self, name: &str) -> Option<usize> {
         self.properties
@@ -50,9 +51,9 @@ impl Element {
     }
 
     /// Bytes of the shortest row: every list empty; in ASCII a digit and a blank for each value.
-    pub fn shortest_row(&self, encoding: Encoding) -> usize {
+    pub fn shortest_row(&self, encoding: PlyEncoding) -> usize {
         let size = |property: &Property| match (encoding, property.kind) {
-            (Encoding::Ascii, _) => 2,
+            (PlyEncoding::Ascii, _) => 2,
             (_, PlyKind::Scalar(scalar)) => scalar.size(),
             (_, PlyKind::List { count, .. }) => count.size(),
         };
@@ -61,8 +62,8 @@ impl Element {
 }
 
 pub(super) struct PlyHeader {
-    pub encoding: Encoding,
-    pub elements: Vec<Element>,
+    pub encoding: PlyEncoding,
+    pub elements: Vec<PlyElement>,
     pub end_of_line: u8,
     /// lines of the header
     pub lines: usize,
@@ -78,7 +79,7 @@ impl PlyHeader {
             _ => b'\n',
         };
         let mut lines = NumberedLines::new(bytes, end_of_line);
-        let (mut encoding, mut elements) = (None, Vec::<Element>::new());
+        let (mut encoding, mut elements) = (None, Vec::<PlyElement>::new());
         while let Some(line) = lines.next() {
             let place = FilePlace::Line(lines.number());
             let words: Vec<&str> = line.split_ascii_whitespace().collect();
@@ -126,11 +127,11 @@ impl PlyHeader {
     }
 }
 
-fn encoding_of(name: &str, place: FilePlace) -> Result<Encoding, Syntax> {
+fn encoding_of(name: &str, place: FilePlace) -> Result<PlyEncoding, Syntax> {
     match name {
-        "ascii" => Ok(Encoding::Ascii),
-        "binary_little_endian" => Ok(Encoding::Little),
-        "binary_big_endian" => Ok(Encoding::Big),
+        "ascii" => Ok(PlyEncoding::Ascii),
+        "binary_little_endian" => Ok(PlyEncoding::Little),
+        "binary_big_endian" => Ok(PlyEncoding::Big),
         _ => Err(Syntax::unexpected(
             place,
             "ascii, binary_little_endian or binary_big_endian",
@@ -139,11 +140,11 @@ fn encoding_of(name: &str, place: FilePlace) -> Result<Encoding, Syntax> {
     }
 }
 
-fn element(name: &str, count: &str, line: usize) -> Result<Element, Syntax> {
+fn element(name: &str, count: &str, line: usize) -> Result<PlyElement, Syntax> {
     let count = count
         .parse()
         .map_err(|_| Syntax::unexpected(FilePlace::Line(line), "how many there are", count))?;
-    Ok(Element {
+    Ok(PlyElement {
         name: name.into(),
         count,
         properties: Vec::new(),

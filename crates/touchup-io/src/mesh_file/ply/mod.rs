@@ -14,7 +14,7 @@ use super::defect::Syntax;
 use super::soup::{Polygons, Soup};
 use crate::file_error::FilePlace;
 use body::Body;
-use header::{Element, PlyHeader};
+use header::{PlyElement, PlyHeader};
 
 /// Usual names of the list of a face's vertices.
 const VERTEX_LISTS: [&str; 2] = ["vertex_indices", "vertex_index"];
@@ -83,7 +83,7 @@ pub(super) fn read_columns<const N: usize>(
 
 fn read_vertices<const N: usize>(
     body: &mut Body,
-    element: &Element,
+    element: &PlyElement,
     scale: f64,
     names: [&str; N],
 ) -> Result<(Vec<Point3<f64>>, Columns<N>), Syntax> {
@@ -109,7 +109,7 @@ fn read_vertices<const N: usize>(
 }
 
 /// The columns of x, y and z.
-fn position_columns(element: &Element) -> Result<[usize; 3], Syntax> {
+fn position_columns(element: &PlyElement) -> Result<[usize; 3], Syntax> {
     let mut columns = [0; 3];
     for (column, name) in columns.iter_mut().zip(["x", "y", "z"]) {
         *column = element.scalar(name).ok_or_else(|| {
@@ -124,7 +124,7 @@ fn position_columns(element: &Element) -> Result<[usize; 3], Syntax> {
 }
 
 /// The list of the vertices of each face.
-fn vertex_list(element: &Element) -> Result<usize, Syntax> {
+fn vertex_list(element: &PlyElement) -> Result<usize, Syntax> {
     let list = VERTEX_LISTS.iter().find_map(|name| element.list(name));
     list.ok_or_else(|| {
         Syntax::unexpected(

@@ -7,7 +7,7 @@ use super::super::appearance::{PaintedSoup, SoupTexture};
 use super::super::defect::Syntax;
 use super::super::soup::Polygons;
 use super::body::Body;
-use super::header::{Element, PlyHeader, PlyKind};
+use super::header::{PlyElement, PlyHeader, PlyKind};
 use super::{IMAGE, OF_CORNERS, read, read_vertices, vertex_list, vertices};
 use crate::scalar::Scalar;
 
@@ -126,7 +126,7 @@ fn body_of<'a>(bytes: &'a [u8], header: &PlyHeader, name: &str) -> Result<Body<'
 fn read_corners(
     bytes: &[u8],
     header: &PlyHeader,
-    face: &Element,
+    face: &PlyElement,
     positions: &[Point3<f64>],
 ) -> Result<(Vec<[u32; 3]>, SoupTexture), Syntax> {
     let body = || body_of(bytes, header, "face");

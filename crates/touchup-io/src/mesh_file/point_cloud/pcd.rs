@@ -14,7 +14,7 @@ const NAMES: [&str; 6] = ["x", "y", "z", "normal_x", "normal_y", "normal_z"];
 
 /// Encoding of the points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Encoding {
+enum PcdEncoding {
     Ascii,
     Binary,
     Compressed,
@@ -22,7 +22,7 @@ enum Encoding {
 
 /// A field of each point.
 #[derive(Debug, Default)]
-struct Field {
+struct PcdField {
     name: String,
     /// bytes of one value
     size: usize,
@@ -31,7 +31,7 @@ struct Field {
     count: usize,
 }
 
-impl Field {
+impl PcdField {
     fn bytes(&self) -> usize {
         self.size * self.count
     }
@@ -53,13 +53,13 @@ impl Field {
 
 #[derive(Debug, Default)]
 struct PcdHeader {
-    fields: Vec<Field>,
+    fields: Vec<PcdField>,
     width: u64,
     height: u64,
     /// as announced, or width × height
     points: u64,
     eye: Option<Point3<f64>>,
-    encoding: Option<Encoding>,
+    encoding: Option<PcdEncoding>,
     /// lines and bytes of the header
     lines: usize,
     len: usize,
@@ -87,8 +87,8 @@ pub(super) fn read(bytes: &[u8], scale: f64) -> Result<PointCloud, Syntax> {
         }
     };
     match header.encoding {
-        Some(Encoding::Ascii) => header.ascii(body, &columns, &mut take)?,
-        Some(Encoding::Binary) => {
+        Some(PcdEncoding::Ascii) => header.ascii(body, &columns, &mut take)?,
+        Some(PcdEncoding::Binary) => {
             header.check_length(body.len(), header.row_bytes())?;
             let rows = body
                 .chunks_exact(header.row_bytes())
@@ -104,7 +104,7 @@ pub(super) fn read(bytes: &[u8], scale: f64) -> Result<PointCloud, Syntax> {
             let body = header.unpacked(body)?;
             let points = header.points as usize;
             // the values of a field are contiguous
-            let place = |c: Column, at: usize| c.offset * points + at * c.step;
+            let place = |c: PcdColumn, at: usize| c.offset * points + at * c.step;
             (0..points).for_each(|at| {
                 take(
                     columns.map(|c| value(&body, place(c, at), c.scalar)),
@@ -128,7 +128,7 @@ pub(super) fn read(bytes: &[u8], scale: f64) -> Result<PointCloud, Syntax> {
 
 /// Place of a value in a point.
 #[derive(Clone, Copy, Debug)]
-struct Column {
+struct PcdColumn {
     /// number of values before it
     index: usize,
     /// number of bytes before it
@@ -156,7 +156,7 @@ impl PcdHeader {
             let words: Vec<&str> = words.collect();
             match key {
                 "FIELDS" | "COLUMNS" => {
-                    let field = |name: &&str| Field {
+                    let field = |name: &&str| PcdField {
                         name: (*name).into(),
                         size: 4,
                         kind: 'F',
@@ -205,7 +205,7 @@ impl PcdHeader {
         &mut self,
         words: &[&str],
         place: FilePlace,
-        mut set: impl FnMut(&mut Field, &str) -> Option<()>,
+        mut set: impl FnMut(&mut PcdField, &str) -> Option<()>,
     ) -> Result<(), Syntax> {
         /// Maximum number of values of a field: a histogram has some hundred.
         const MOST: usize = 1 << 16;
@@ -250,7 +250,7 @@ impl PcdHeader {
     }
 
     /// Columns of the values of [`NAMES`].
-    fn columns(&self) -> Result<[Column; 6], Syntax> {
+    fn columns(&self) -> Result<[PcdColumn; 6], Syntax> {
         let find = |name: &str| {
             let at = self
                 .fields
@@ -258,14 +258,14 @@ impl PcdHeader {
                 .position(|field| field.name == name && field.count > 0)?;
             let before = &self.fields[..at];
             let field = &self.fields[at];
-            Some(Column {
+            Some(PcdColumn {
                 index: before.iter().map(|field| field.count).sum(),
-                offset: before.iter().map(Field::bytes).sum(),
+                offset: before.iter().map(PcdField::bytes).sum(),
                 step: field.bytes(),
                 scalar: field.scalar(),
             })
         };
-        let none = Column {
+        let none = PcdColumn {
             index: usize::MAX,
             offset: 0,
             step: 0,
@@ -291,7 +291,7 @@ impl PcdHeader {
     }
 
     fn row_bytes(&self) -> usize {
-        self.fields.iter().map(Field::bytes).sum()
+        self.fields.iter().map(PcdField::bytes).sum()
     }
 
     /// Refuses more points than there are bytes for: afterwards their number is safe for memory.
@@ -315,7 +315,7 @@ impl PcdHeader {
     fn ascii(
         &self,
         body: &[u8],
-        columns: &[Column; 6],
+        columns: &[PcdColumn; 6],
         take: &mut impl FnMut([f64; 6], bool),
     ) -> Result<(), Syntax> {
         let words_of_row: usize = self.fields.iter().map(|field| field.count).sum();
@@ -399,11 +399,11 @@ fn count(words: &[&str], place: FilePlace) -> Result<u64, Syntax> {
         .map_err(|_| Syntax::unexpected(place, "how many there are", word))
 }
 
-fn encoding(words: &[&str], place: FilePlace) -> Result<Encoding, Syntax> {
+fn encoding(words: &[&str], place: FilePlace) -> Result<PcdEncoding, Syntax> {
     match words {
-        ["ascii"] => Ok(Encoding::Ascii),
-        ["binary"] => Ok(Encoding::Binary),
-        ["binary_compressed"] => Ok(Encoding::Compressed),
+        ["ascii"] => Ok(PcdEncoding::Ascii),
+        ["binary"] => Ok(PcdEncoding::Binary),
+        ["binary_compressed"] => Ok(PcdEncoding::Compressed),
         _ => Err(Syntax::unexpected(
             place,
             "ascii, binary or binary_compressed",

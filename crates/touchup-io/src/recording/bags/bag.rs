@@ -10,7 +10,7 @@ use std::io::Read;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use super::bag_index::{Connections, Head, Index, LENGTH_BYTES, MAGIC, op};
+use super::bag_index::{BagIndex, Connections, LENGTH_BYTES, MAGIC, RecordHeader, op};
 use crate::recording::mcap_files::framing::{ByteStream, Fields, check_length};
 use crate::recording::topics::check_topic;
 use crate::recording::{
@@ -19,7 +19,7 @@ use crate::recording::{
 };
 
 /// Topic and its format, place of the payload in the records, log time, ns.
-type FoundMessage = (TopicKind, MessageFormat, Range<usize>, i64);
+type BagMessage = (TopicKind, MessageFormat, Range<usize>, i64);
 
 /// Messages of the topics of a touch of one bag, in the order of the file.
 pub(in crate::recording) struct BagReader {
@@ -49,7 +49,7 @@ impl BagReader {
         layout: &RecordingLayout,
     ) -> Result<(Self, Option<RecordingError>), RecordingError> {
         let mut reader = Self::start(path, layout)?;
-        let index = Index::read(path);
+        let index = BagIndex::read(path);
         reader.truncated = index.is_none();
         if let Some(index) = index {
             reader.promised = Some(index.promised(layout));
@@ -111,7 +111,7 @@ impl BagReader {
         }
     }
 
-    fn advance(&mut self) -> Result<Option<FoundMessage>, RecordingError> {
+    fn advance(&mut self) -> Result<Option<BagMessage>, RecordingError> {
         loop {
             while self.next < self.records.len() {
                 if let Some(message) = self.next_record()? {
@@ -126,7 +126,7 @@ impl BagReader {
 
     /// Takes one record of the current chunk; a message of the topics of a touch gives its
     /// payload's place in `records`.
-    fn next_record(&mut self) -> Result<Option<FoundMessage>, RecordingError> {
+    fn next_record(&mut self) -> Result<Option<BagMessage>, RecordingError> {
         let damaged = |damage| RecordingError::Damaged {
             path: self.path.clone(),
             place: FilePlace::Byte(self.at),
@@ -140,7 +140,7 @@ impl BagReader {
             ))
         };
         let (header, data) = split().map_err(damaged)?;
-        let head = Head::of(header).map_err(damaged)?;
+        let head = RecordHeader::of(header).map_err(damaged)?;
         self.next = self.records.len() - rest.0.len();
         match head.op {
             op::CONNECTION => {
@@ -176,7 +176,7 @@ impl BagReader {
             self.packed.clear();
             self.stream.load(LENGTH_BYTES, &mut self.packed)?;
             let length = Fields(&self.packed).u32("length of data")?;
-            let head = Head::of(&self.header)?;
+            let head = RecordHeader::of(&self.header)?;
             self.packed.clear();
             match head.op {
                 op::CHUNK => {
@@ -239,7 +239,7 @@ impl RecordingFile for BagReader {
 }
 
 /// Unpacks the records of a chunk, for which `records` is empty.
-fn unpack_chunk(head: &Head, packed: &[u8], records: &mut Vec<u8>) -> Result<(), Damage> {
+fn unpack_chunk(head: &RecordHeader, packed: &[u8], records: &mut Vec<u8>) -> Result<(), Damage> {
     let announced = u64::from(head.size);
     check_length("unpacked chunk", announced)?;
     // one byte beyond the announced size reveals an excess

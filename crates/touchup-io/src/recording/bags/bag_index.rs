@@ -25,7 +25,7 @@ pub(in crate::recording) mod op {
 
 /// Fields in use of a record's header; 0 and empty if absent.
 #[derive(Default)]
-pub(in crate::recording) struct Head<'a> {
+pub(in crate::recording) struct RecordHeader<'a> {
     pub op: u8,
     pub connection: u32,
     /// time of reception by the recorder
@@ -40,7 +40,7 @@ pub(in crate::recording) struct Head<'a> {
     count: u32,
 }
 
-impl<'a> Head<'a> {
+impl<'a> RecordHeader<'a> {
     pub fn of(header: &'a [u8]) -> Result<Self, Damage> {
         let mut head = Self::default();
         for (name, value) in named_fields(header)? {
@@ -92,7 +92,7 @@ pub(in crate::recording) struct Connections {
 const CONNECTION_BYTES: usize = 128;
 
 impl Connections {
-    pub fn add(&mut self, head: &Head, data: &[u8]) -> Result<&TopicInfo, Damage> {
+    pub fn add(&mut self, head: &RecordHeader, data: &[u8]) -> Result<&TopicInfo, Damage> {
         let fields = named_fields(data)?;
         let named = |wanted: &[u8]| {
             fields
@@ -131,13 +131,13 @@ impl Connections {
 }
 
 /// The index at the end of the bag.
-pub(in crate::recording) struct Index {
+pub(in crate::recording) struct BagIndex {
     pub connections: Connections,
     /// messages of each connection
     counts: BTreeMap<u32, u64>,
 }
 
-impl Index {
+impl BagIndex {
     /// `None` without an index, as in a bag of a killed recorder: then the reader searches the
     /// data.
     pub fn read(path: &Path) -> Option<Self> {
@@ -150,7 +150,7 @@ impl Index {
         check_length("header of the bag", length).ok()?;
         let mut header = Vec::new();
         file.by_ref().take(length).read_to_end(&mut header).ok()?;
-        let start = Head::of(&header).ok()?.index_at;
+        let start = RecordHeader::of(&header).ok()?.index_at;
         let length = size.checked_sub(start).filter(|_| start > 0)?;
         check_length("index", length).ok()?;
         file.seek(SeekFrom::Start(start)).ok()?;
@@ -171,7 +171,7 @@ impl Index {
                 rest.sized("header of a record")?,
                 rest.sized("data of a record")?,
             );
-            let head = Head::of(header)?;
+            let head = RecordHeader::of(header)?;
             match head.op {
                 op::CONNECTION => drop(self.connections.add(&head, data)?),
                 op::CHUNK_INFO => {

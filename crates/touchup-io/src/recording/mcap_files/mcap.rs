@@ -26,7 +26,7 @@ pub(in crate::recording) const MAGIC: [u8; 8] = *b"\x89MCAP0\r\n";
 /// Footer record and the magic behind it.
 const TAIL_BYTES: usize = HEAD_BYTES + 20 + MAGIC.len();
 /// Topic and its format, place of the payload in the records, log time, ns.
-type FoundMessage = (TopicKind, MessageFormat, Range<usize>, i64);
+type McapMessage = (TopicKind, MessageFormat, Range<usize>, i64);
 
 /// Channel, sequence, log time and publish time in front of a message's payload.
 const MESSAGE_HEAD_BYTES: usize = 22;
@@ -36,7 +36,7 @@ pub(in crate::recording) struct McapReader {
     path: PathBuf,
     layout: RecordingLayout,
     stream: ByteStream,
-    described: Described,
+    described: McapChannels,
     /// Content of the channels in use.
     read: BTreeMap<u16, (TopicKind, MessageFormat)>,
     /// One record as stored in the file.
@@ -61,7 +61,11 @@ impl McapReader {
         layout: &RecordingLayout,
         packed: bool,
     ) -> Result<(Self, Option<RecordingError>), RecordingError> {
-        let index = if packed { None } else { Index::read(path) };
+        let index = if packed {
+            None
+        } else {
+            McapSummary::read(path)
+        };
         let mut reader = Self::start(path, layout, packed)?;
         reader.truncated = !packed && index.is_none();
         if let Some(index) = index {
@@ -87,7 +91,7 @@ impl McapReader {
             path: path.to_owned(),
             layout: layout.clone(),
             stream,
-            described: Described::default(),
+            described: McapChannels::default(),
             read: BTreeMap::new(),
             packed: Vec::new(),
             records: Vec::new(),
@@ -104,7 +108,7 @@ impl McapReader {
 
     /// Takes over descriptions found elsewhere; a topic of a wrong type is an error of the caller's
     /// topic check.
-    fn knows(&mut self, described: Described) {
+    fn knows(&mut self, described: McapChannels) {
         let read = described.channels.iter();
         let read = read.filter_map(|(id, info)| {
             Some((*id, check_topic(&self.path, &self.layout, info).ok()??))
@@ -127,7 +131,7 @@ impl McapReader {
         }
     }
 
-    fn advance(&mut self) -> Result<Option<FoundMessage>, RecordingError> {
+    fn advance(&mut self) -> Result<Option<McapMessage>, RecordingError> {
         loop {
             while self.next < self.records.len() {
                 if let Some(message) = self.next_record()? {
@@ -142,7 +146,7 @@ impl McapReader {
 
     /// Takes one record of the current chunk; a message of the topics of a touch gives its
     /// payload's place in `records`.
-    fn next_record(&mut self) -> Result<Option<FoundMessage>, RecordingError> {
+    fn next_record(&mut self) -> Result<Option<McapMessage>, RecordingError> {
         let (opcode, body) =
             split_record(&self.records[self.next..]).map_err(|damage| self.damaged(damage))?;
         let start = self.next + HEAD_BYTES;
@@ -305,13 +309,13 @@ fn unpack_chunk(chunk: &[u8], records: &mut Vec<u8>) -> Result<(), Damage> {
 
 /// Schemas and channels up to now; at most 65,536 of each.
 #[derive(Default)]
-struct Described {
+struct McapChannels {
     schemas: BTreeMap<u16, String>,
     channels: BTreeMap<u16, TopicInfo>,
     name_bytes: NameBytes,
 }
 
-impl Described {
+impl McapChannels {
     fn add_schema(&mut self, body: &[u8]) -> Result<(), Damage> {
         let mut fields = Fields(body);
         let id = fields.u16("number of a schema")?;
@@ -363,15 +367,15 @@ impl Described {
 }
 
 /// The summary at the end of the file.
-struct Index {
-    described: Described,
+struct McapSummary {
+    described: McapChannels,
     /// Messages on each channel, if the file has statistics.
     counts: Option<BTreeMap<u16, u64>>,
     /// It has a correct checksum.
     checked: bool,
 }
 
-impl Index {
+impl McapSummary {
     /// `None` when the file's end is missing or damaged: then the reader searches the data.
     fn read(path: &Path) -> Option<Self> {
         let mut file = File::open(path).ok()?;
@@ -389,7 +393,7 @@ impl Index {
             .u32("checksum of the summary")
             .ok()?;
         let mut index = Self {
-            described: Described::default(),
+            described: McapChannels::default(),
             counts: None,
             checked: false,
         };

@@ -2,19 +2,19 @@
 //!
 //! Quaternions are x, y, z, w here and in the encoders, and nowhere else.
 
-use super::franka::{ArmState, franka_robot_state, franka_state};
+use super::franka::{FrankaSample, franka_robot_state, franka_state};
 use super::message_type::{MessageFormat, MessageType};
 use super::point_cloud;
-use super::wire::{Header, MessageFields, WireReader};
+use super::wire::{MessageFields, RosHeader, WireReader};
 use crate::recording::{BadMessage, Record};
 use touchup_method::stylus::{FrameTransform, Message, StampedPose, StampedWrench};
 
 /// Content of a message.
-pub(in crate::recording) enum Decoded {
+pub(in crate::recording) enum MessageContent {
     /// A pose, wrench or frame of markers, and the frame that its header names.
     Record(String, Record),
     /// A pose and a wrench.
-    State(Box<ArmState>),
+    State(Box<FrankaSample>),
     /// Links of a tree.
     Transforms(Vec<FrameTransform>),
 }
@@ -29,11 +29,11 @@ pub(in crate::recording) fn decode(
     format: MessageFormat,
     payload: &[u8],
     logged_ns: i64,
-) -> Result<Decoded, BadMessage> {
+) -> Result<MessageContent, BadMessage> {
     let MessageFormat { message_type, wire } = format;
     if message_type == MessageType::PointCloud {
         let (frame, seen) = point_cloud::decode_markers(payload)?;
-        return Ok(Decoded::Record(
+        return Ok(MessageContent::Record(
             frame.into_owned(),
             Record::Markers(Box::new(seen)),
         ));
@@ -46,19 +46,19 @@ pub(in crate::recording) fn decode_fields(
     format: MessageFormat,
     fields: &mut impl MessageFields,
     logged_ns: i64,
-) -> Result<Decoded, BadMessage> {
+) -> Result<MessageContent, BadMessage> {
     let MessageFormat { message_type, wire } = format;
-    let unnamed = || Header {
+    let unnamed = || RosHeader {
         stamp_ns: logged_ns,
-        ..Header::default()
+        ..RosHeader::default()
     };
     let decoded = match message_type {
         MessageType::Transforms => transforms(fields)?,
         MessageType::FrankaState => {
-            return franka_state(wire, fields).map(|state| Decoded::State(Box::new(state)));
+            return franka_state(wire, fields).map(|state| MessageContent::State(Box::new(state)));
         }
         MessageType::FrankaRobotState => {
-            return franka_robot_state(fields).map(|state| Decoded::State(Box::new(state)));
+            return franka_robot_state(fields).map(|state| MessageContent::State(Box::new(state)));
         }
         MessageType::Pose => pose_in(unnamed(), fields)?,
         MessageType::Wrench => wrench_in(unnamed(), fields)?,
@@ -98,29 +98,38 @@ pub(in crate::recording) fn decode_fields(
     Ok(decoded)
 }
 
-fn pose_in(header: Header, fields: &mut impl MessageFields) -> Result<Decoded, BadMessage> {
+fn pose_in(
+    header: RosHeader,
+    fields: &mut impl MessageFields,
+) -> Result<MessageContent, BadMessage> {
     let pose = StampedPose {
         stamp_ns: header.stamp_ns,
         pose_ot: fields.pose()?,
     };
-    Ok(Decoded::Record(header.frame, Message::Pose(pose).into()))
+    Ok(MessageContent::Record(
+        header.frame,
+        Message::Pose(pose).into(),
+    ))
 }
 
-fn wrench_in(header: Header, fields: &mut impl MessageFields) -> Result<Decoded, BadMessage> {
+fn wrench_in(
+    header: RosHeader,
+    fields: &mut impl MessageFields,
+) -> Result<MessageContent, BadMessage> {
     let wrench = StampedWrench {
         stamp_ns: header.stamp_ns,
         wrench: fields.wrench()?,
     };
-    Ok(Decoded::Record(
+    Ok(MessageContent::Record(
         header.frame,
         Message::Wrench(wrench).into(),
     ))
 }
 
-fn transforms(fields: &mut impl MessageFields) -> Result<Decoded, BadMessage> {
+fn transforms(fields: &mut impl MessageFields) -> Result<MessageContent, BadMessage> {
     let count = fields.count(TRANSFORM_BYTES)?;
     let mut transform = || {
-        let Header {
+        let RosHeader {
             stamp_ns,
             frame: parent,
         } = fields.header()?;
@@ -136,7 +145,7 @@ fn transforms(fields: &mut impl MessageFields) -> Result<Decoded, BadMessage> {
     (0..count)
         .map(|_| transform())
         .collect::<Result<_, _>>()
-        .map(Decoded::Transforms)
+        .map(MessageContent::Transforms)
 }
 
 #[cfg(test)]

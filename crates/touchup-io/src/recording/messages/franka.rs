@@ -2,13 +2,13 @@
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, UnitQuaternion};
 
-use super::wire::{Header, MessageFields, Wire};
+use super::wire::{MessageFields, RosHeader, WireFormat};
 use crate::recording::BadMessage;
 use touchup_method::stylus::{StampedPose, StampedWrench};
 
 /// Pose and wrench of one instant, each with its frame.
 #[derive(Debug)]
-pub(in crate::recording) struct ArmState {
+pub(in crate::recording) struct FrankaSample {
     pub pose_frame: String,
     pub pose: StampedPose,
     pub wrench_frame: String,
@@ -17,10 +17,10 @@ pub(in crate::recording) struct ArmState {
 
 /// Numbers of a `franka_msgs/FrankaState` before `O_F_ext_hat_K`, from there to `O_T_EE`, and
 /// behind that.
-const fn franka_numbers(wire: Wire) -> [usize; 3] {
+const fn franka_numbers(wire: WireFormat) -> [usize; 3] {
     match wire {
-        Wire::Ros1 => [2 * 6 + 9 * 7 + 6 + 2 * 2 + 2 * 7, 7 + 3 * 13, 3 * 16 + 2],
-        Wire::Cdr => [
+        WireFormat::Ros1 => [2 * 6 + 9 * 7 + 6 + 2 * 2 + 2 * 7, 7 + 3 * 13, 3 * 16 + 2],
+        WireFormat::Cdr => [
             2 * 6 + 10 * 7 + 6 + 5 * 2 + 2 * 7,
             3 * 6 + 7 + 3 * 13,
             4 * 16 + 2,
@@ -34,9 +34,9 @@ const FRANKA_FLAGS: std::ops::RangeInclusive<usize> = 1 + 2 * 30..=1 + 2 * 64;
 
 /// `O_T_EE` and `O_F_ext_hat_K`, both in the axes of the base.
 pub(in crate::recording) fn franka_state(
-    wire: Wire,
+    wire: WireFormat,
     fields: &mut impl MessageFields,
-) -> Result<ArmState, BadMessage> {
+) -> Result<FrankaSample, BadMessage> {
     let header = fields.header()?;
     let [before, between, behind] = franka_numbers(wire);
     fields.skip_f64s(before)?;
@@ -46,12 +46,12 @@ pub(in crate::recording) fn franka_state(
     fields.skip_f64s(behind)?;
     flags(fields)?;
     let pose_ot = from_columns(&matrix).ok_or(BadMessage::Quaternion)?;
-    let Header { stamp_ns, frame } = header;
+    let RosHeader { stamp_ns, frame } = header;
     let (pose, wrench) = (
         StampedPose { stamp_ns, pose_ot },
         StampedWrench { stamp_ns, wrench },
     );
-    Ok(ArmState {
+    Ok(FrankaSample {
         pose_frame: frame.clone(),
         pose,
         wrench_frame: frame,
@@ -71,7 +71,7 @@ fn flags(fields: &mut impl MessageFields) -> Result<(), BadMessage> {
 /// with the stamp of the whole, in their own frames, or else in that of the whole.
 pub(in crate::recording) fn franka_robot_state(
     fields: &mut impl MessageFields,
-) -> Result<ArmState, BadMessage> {
+) -> Result<FrankaSample, BadMessage> {
     let whole = fields.header()?;
     // contacts and collisions in space and of the joints
     fields.skip_f64s(4 * 3 + 2 * 7)?;
@@ -97,14 +97,14 @@ pub(in crate::recording) fn franka_robot_state(
     fields.skip_f64s(2)?;
     flags(fields)?;
     let stamp_ns = whole.stamp_ns;
-    let frame = |own: Header| {
+    let frame = |own: RosHeader| {
         if own.frame.is_empty() {
             whole.frame.clone()
         } else {
             own.frame
         }
     };
-    Ok(ArmState {
+    Ok(FrankaSample {
         pose_frame: frame(pose_header),
         pose: StampedPose { stamp_ns, pose_ot },
         wrench_frame: frame(wrench_header),

@@ -4,9 +4,9 @@ use std::fmt;
 
 use serde::de::{DeserializeSeed, Deserializer, SeqAccess, Visitor};
 
-use super::decode::{Decoded, decode, decode_fields};
+use super::decode::{MessageContent, decode, decode_fields};
 use super::message_type::{MessageFormat, MessageType};
-use super::wire::{MAX_MESSAGE_BYTES, SequenceFields, Wire};
+use super::wire::{MAX_MESSAGE_BYTES, SequenceFields, WireFormat};
 use crate::recording::layout::TopicKind;
 use crate::recording::{BadMessage, Record};
 use touchup_method::stylus::Message;
@@ -102,24 +102,26 @@ impl LiveType {
     fn format(self) -> MessageFormat {
         MessageFormat {
             message_type: self.message_type,
-            wire: Wire::Cdr,
+            wire: WireFormat::Cdr,
         }
     }
 
-    fn sample(self, decoded: Decoded) -> Result<LiveMessage, BadMessage> {
+    fn sample(self, decoded: MessageContent) -> Result<LiveMessage, BadMessage> {
         match (decoded, self.kind) {
-            (Decoded::Record(frame, Record::Message(message)), _) => {
+            (MessageContent::Record(frame, Record::Message(message)), _) => {
                 Ok(LiveMessage { frame, message })
             }
-            (Decoded::State(state), SampleKind::Pose) => Ok(LiveMessage {
+            (MessageContent::State(state), SampleKind::Pose) => Ok(LiveMessage {
                 frame: state.pose_frame,
                 message: Message::Pose(state.pose),
             }),
-            (Decoded::State(state), SampleKind::Wrench) => Ok(LiveMessage {
+            (MessageContent::State(state), SampleKind::Wrench) => Ok(LiveMessage {
                 frame: state.wrench_frame,
                 message: Message::Wrench(state.wrench),
             }),
-            (Decoded::Record(..) | Decoded::Transforms(_), _) => Err(BadMessage::Malformed),
+            (MessageContent::Record(..) | MessageContent::Transforms(_), _) => {
+                Err(BadMessage::Malformed)
+            }
         }
     }
 }

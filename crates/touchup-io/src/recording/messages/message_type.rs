@@ -1,6 +1,6 @@
 //! The types of messages that give a pose or a wrench.
 
-use super::wire::Wire;
+use super::wire::WireFormat;
 use crate::recording::layout::{TopicInfo, TopicKind};
 
 /// A type that gives poses or wrenches.
@@ -129,7 +129,7 @@ impl MessageType {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::recording) struct MessageFormat {
     pub message_type: MessageType,
-    pub wire: Wire,
+    pub wire: WireFormat,
 }
 
 impl MessageFormat {
@@ -137,8 +137,8 @@ impl MessageFormat {
     pub fn of(info: &TopicInfo, kind: TopicKind) -> Result<Self, String> {
         let type_name = &info.type_name;
         let message_type = MessageType::giving(kind, type_name, "--pose-frame", kind.flag())?;
-        match (message_type, Wire::of(&info.encoding)) {
-            (MessageType::PointCloud, Some(Wire::Ros1)) => Err(format!(
+        match (message_type, WireFormat::of(&info.encoding)) {
+            (MessageType::PointCloud, Some(WireFormat::Ros1)) => Err(format!(
                 "{type_name} of ROS 1; convert the recording with `rosbags-convert` to read markers"
             )),
             (_, Some(wire)) => Ok(Self { message_type, wire }),

@@ -64,12 +64,12 @@ impl TransformTree {
     }
 
     /// The frames from the moving one up to below the base, and the base.
-    fn chain(&self, frames: &TransformFrames) -> Option<(Vec<ChainLink>, String)> {
+    fn chain(&self, frames: &TransformFrames) -> Option<(Vec<TransformLink>, String)> {
         let (mut links, mut at) = (Vec::new(), frames.moving.clone());
         while frames.base.as_ref() != Some(&at) && links.len() <= self.links.len() {
             match self.links.get(&at) {
                 Some(TreeLink { parent, fixed }) => {
-                    links.push(ChainLink {
+                    links.push(TransformLink {
                         child: at,
                         parent: parent.clone(),
                         fixed: *fixed,
@@ -119,7 +119,7 @@ impl TransformTree {
             links,
             frames: FrameBuffer::default(),
         };
-        for ChainLink {
+        for TransformLink {
             child,
             parent,
             fixed,
@@ -153,7 +153,8 @@ impl TransformTree {
     }
 }
 
-struct ChainLink {
+/// A link between two frames of a chain.
+struct TransformLink {
     child: String,
     parent: String,
     /// of a static link
@@ -164,7 +165,7 @@ struct ChainLink {
 pub(in crate::recording) struct TransformChain {
     pub poses: MovingFrame,
     /// from the moving frame up
-    links: Vec<ChainLink>,
+    links: Vec<TransformLink>,
     frames: FrameBuffer,
 }
 

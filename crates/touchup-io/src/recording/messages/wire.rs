@@ -22,14 +22,14 @@ const NS_PER_S: i64 = 1_000_000_000;
 
 /// Wire format of the messages of a topic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in crate::recording) enum Wire {
+pub(in crate::recording) enum WireFormat {
     /// of ROS 2, with its four bytes of encapsulation
     Cdr,
     /// of ROS 1
     Ros1,
 }
 
-impl Wire {
+impl WireFormat {
     /// By the encoding's name in a recording.
     pub fn of(encoding: &str) -> Option<Self> {
         match encoding {
@@ -42,7 +42,7 @@ impl Wire {
 
 /// Stamp and frame of a message.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(in crate::recording) struct Header {
+pub(in crate::recording) struct RosHeader {
     pub stamp_ns: i64,
     pub frame: String,
 }
@@ -60,7 +60,7 @@ pub(in crate::recording) trait MessageFields {
     fn rest(&mut self) -> usize;
 
     /// A `std_msgs/Header`.
-    fn header(&mut self) -> Result<Header, BadMessage> {
+    fn header(&mut self) -> Result<RosHeader, BadMessage> {
         let [sec, nanosec] = [self.u32()?, self.u32()?];
         // the bits of an int32
         header_of(i64::from(sec.cast_signed()), nanosec, &self.name()?)
@@ -109,14 +109,14 @@ pub(in crate::recording) trait MessageFields {
     }
 }
 
-fn header_of(sec: i64, nanosec: u32, frame: &str) -> Result<Header, BadMessage> {
+fn header_of(sec: i64, nanosec: u32, frame: &str) -> Result<RosHeader, BadMessage> {
     let nanosec = i64::from(nanosec);
     if nanosec >= NS_PER_S {
         return Err(BadMessage::Stamp);
     }
     // a leading slash has no meaning
     let frame = frame.strip_prefix('/').unwrap_or(frame).to_owned();
-    Ok(Header {
+    Ok(RosHeader {
         stamp_ns: sec * NS_PER_S + nanosec,
         frame,
     })
@@ -124,7 +124,7 @@ fn header_of(sec: i64, nanosec: u32, frame: &str) -> Result<Header, BadMessage> 
 
 /// The rest of a payload.
 pub(in crate::recording) struct WireReader<'a> {
-    wire: Wire,
+    wire: WireFormat,
     is_big: bool,
     body: &'a [u8],
     at: usize,
@@ -134,11 +134,11 @@ impl<'a> WireReader<'a> {
     /// # Errors
     /// [`BadMessage::Malformed`] for a payload that is too long, or without the encapsulation of
     /// XCDR version 1.
-    pub fn new(wire: Wire, payload: &'a [u8]) -> Result<Self, BadMessage> {
+    pub fn new(wire: WireFormat, payload: &'a [u8]) -> Result<Self, BadMessage> {
         let (is_big, body) = match (wire, payload.split_first_chunk()) {
-            (Wire::Ros1, _) => (false, payload),
-            (Wire::Cdr, Some((&[0, order @ (0 | 1), _, _], body))) => (order == 0, body),
-            (Wire::Cdr, _) => return Err(BadMessage::Malformed),
+            (WireFormat::Ros1, _) => (false, payload),
+            (WireFormat::Cdr, Some((&[0, order @ (0 | 1), _, _], body))) => (order == 0, body),
+            (WireFormat::Cdr, _) => return Err(BadMessage::Malformed),
         };
         let is_short = body.len() <= MAX_MESSAGE_BYTES;
         if is_short {
@@ -161,7 +161,7 @@ impl<'a> WireReader<'a> {
     }
 
     fn number<const N: usize>(&mut self) -> Result<[u8; N], BadMessage> {
-        if self.wire == Wire::Cdr {
+        if self.wire == WireFormat::Cdr {
             self.at = self.at.next_multiple_of(N);
         }
         let mut number: [u8; N] = self
@@ -204,10 +204,10 @@ impl MessageFields for WireReader<'_> {
         let length = self.count(1)?;
         let bytes = self.bytes(length)?;
         let text = match (self.wire, bytes) {
-            (Wire::Ros1, text) => text,
-            (Wire::Cdr, [text @ .., 0]) => text,
-            (Wire::Cdr, []) => &[],
-            (Wire::Cdr, _) => return Err(BadMessage::Malformed),
+            (WireFormat::Ros1, text) => text,
+            (WireFormat::Cdr, [text @ .., 0]) => text,
+            (WireFormat::Cdr, []) => &[],
+            (WireFormat::Cdr, _) => return Err(BadMessage::Malformed),
         };
         let text = str::from_utf8(text).map_err(|_| BadMessage::Malformed)?;
         if text.len() <= MAX_FRAME_NAME_BYTES {
@@ -217,12 +217,12 @@ impl MessageFields for WireReader<'_> {
         }
     }
 
-    fn header(&mut self) -> Result<Header, BadMessage> {
-        if self.wire == Wire::Ros1 {
+    fn header(&mut self) -> Result<RosHeader, BadMessage> {
+        if self.wire == WireFormat::Ros1 {
             self.u32()?;
         }
         let [sec, nanosec] = [self.u32()?, self.u32()?];
-        let sec = if self.wire == Wire::Ros1 {
+        let sec = if self.wire == WireFormat::Ros1 {
             i64::from(sec)
         } else {
             i64::from(sec.cast_signed())
@@ -237,7 +237,7 @@ impl MessageFields for WireReader<'_> {
     }
 
     fn end(&mut self) -> Result<(), BadMessage> {
-        let padding = if self.wire == Wire::Cdr {
+        let padding = if self.wire == WireFormat::Cdr {
             MAX_PADDING_BYTES
         } else {
             0

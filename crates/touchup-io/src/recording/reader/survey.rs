@@ -1,7 +1,7 @@
 //! Survey of a recording before reading.
 
 use super::super::intake::decode_raw;
-use super::super::messages::decode::Decoded;
+use super::super::messages::decode::MessageContent;
 use super::super::messages::transforms::TransformTree;
 use super::super::opening::open_file;
 use super::super::topics::check_topics;
@@ -42,7 +42,7 @@ impl RecordingReader {
         {
             match source.next_message() {
                 Ok(Some(raw)) => {
-                    if let Ok(Decoded::Transforms(links)) = decode_raw(&raw) {
+                    if let Ok(MessageContent::Transforms(links)) = decode_raw(&raw) {
                         tree.add(links, raw.kind == TopicKind::StaticTransforms);
                     }
                 }

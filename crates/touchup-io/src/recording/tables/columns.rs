@@ -45,7 +45,7 @@ parameters! {
 
 /// A column, and the factor from its numbers to SI.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(in crate::recording) struct Column {
+pub(in crate::recording) struct ScaledColumn {
     pub at: usize,
     pub factor: f64,
 }
@@ -54,19 +54,19 @@ pub(in crate::recording) struct Column {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::recording) enum OrientationColumns {
     /// x, y, z, w
-    Quaternion([Column; 4]),
-    RotationVector([Column; 3]),
+    Quaternion([ScaledColumn; 4]),
+    RotationVector([ScaledColumn; 3]),
     None,
 }
 
 /// The columns in use.
 #[derive(Clone, Debug, PartialEq)]
 pub(in crate::recording) struct FoundColumns {
-    pub time: Column,
-    pub position: [Column; 3],
+    pub time: ScaledColumn,
+    pub position: [ScaledColumn; 3],
     pub orientation: OrientationColumns,
-    pub force: [Column; 3],
-    pub torque: Option<[Column; 3]>,
+    pub force: [ScaledColumn; 3],
+    pub torque: Option<[ScaledColumn; 3]>,
     pub wrench_axes: WrenchAxes,
 }
 
@@ -138,11 +138,11 @@ impl TableColumns {
     /// # Errors
     /// Missing columns or units, in words.
     pub(in crate::recording) fn find(&self, header: &[String]) -> Result<FoundColumns, String> {
-        let header = Header(header);
+        let header = ColumnNames(header);
         let three = |key, named: &Option<Vec<String>>, quantity, usual| {
             header.find::<3>(key, named.as_deref(), quantity, usual)
         };
-        let needed = |key: &'static str, found: Option<[Column; 3]>| {
+        let needed = |key: &'static str, found: Option<[ScaledColumn; 3]>| {
             found.ok_or_else(|| header.missing(key))
         };
         let orientation = match &self.orientation {
@@ -191,9 +191,9 @@ impl TableColumns {
 }
 
 /// The names of the columns.
-struct Header<'a>(&'a [String]);
+struct ColumnNames<'a>(&'a [String]);
 
-impl Header<'_> {
+impl ColumnNames<'_> {
     fn list(&self) -> String {
         self.0.join(", ")
     }
@@ -212,12 +212,12 @@ impl Header<'_> {
         named: Option<&[String]>,
         quantity: Quantity,
         usual: &UsualNames,
-    ) -> Result<Option<[Column; N]>, String> {
+    ) -> Result<Option<[ScaledColumn; N]>, String> {
         if let Some(names) = named {
             let names: &[String; N] = names.try_into().map_err(|_| {
                 format!("columns.{key} names {} columns, it takes {N}", names.len())
             })?;
-            let mut columns = [Column { at: 0, factor: 1.0 }; N];
+            let mut columns = [ScaledColumn { at: 0, factor: 1.0 }; N];
             for (column, name) in columns.iter_mut().zip(names) {
                 *column = self.named(key, name, quantity)?;
             }
@@ -239,12 +239,12 @@ impl Header<'_> {
             else {
                 continue;
             };
-            let mut columns = [Column { at: 0, factor: 1.0 }; N];
+            let mut columns = [ScaledColumn { at: 0, factor: 1.0 }; N];
             for (column, at) in columns.iter_mut().zip(places) {
                 let factor = split_unit(&self.0[at], quantity)
                     .1
                     .map_or_else(|| self.no_unit(&self.0[at], quantity), Ok)?;
-                *column = Column { at, factor };
+                *column = ScaledColumn { at, factor };
             }
             return Ok(Some(columns));
         }
@@ -255,11 +255,11 @@ impl Header<'_> {
         &self,
         quantity: Quantity,
         usual: &UsualNames,
-    ) -> Option<[Column; N]> {
+    ) -> Option<[ScaledColumn; N]> {
         if !self.0.iter().any(|name| name == "actual_TCP_pose_0") || usual.of_rtde.is_empty() {
             return None;
         }
-        let mut columns = [Column {
+        let mut columns = [ScaledColumn {
             at: 0,
             factor: quantity.factor(usual.rtde_unit)?,
         }; N];
@@ -288,7 +288,7 @@ impl Header<'_> {
     }
 
     /// A column by its name in the scene, which may have the unit that the header lacks.
-    fn named(&self, key: &str, name: &str, quantity: Quantity) -> Result<Column, String> {
+    fn named(&self, key: &str, name: &str, quantity: Quantity) -> Result<ScaledColumn, String> {
         let (plain, told) = split_unit(name, quantity);
         let is_meant = |there: &String| split_unit(there, quantity).0 == plain;
         let exact = self.only(key, |there| there == name)?;
@@ -308,7 +308,7 @@ impl Header<'_> {
                 let factor = there
                     .or(told)
                     .map_or_else(|| self.no_unit(&self.0[at], quantity), Ok)?;
-                Ok(Column { at, factor })
+                Ok(ScaledColumn { at, factor })
             }
         }
     }

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
 
-use super::columns::{Column, FoundColumns, OrientationColumns, TableColumns, WrenchAxes};
+use super::columns::{FoundColumns, OrientationColumns, ScaledColumn, TableColumns, WrenchAxes};
 use crate::recording::{BadMessage, Damage, FilePlace, RecordingError};
 use crate::table_rows::{DecimalSign, MAX_ROW_BYTES, RowError, TableRows};
 use touchup_method::stylus::{StampedPose, StampedWrench, Wrench, measured_rotation};
@@ -204,7 +204,7 @@ fn damaged(path: &Path, line: usize, error: RowError) -> RecordingError {
 /// `None`: an empty place, or NaN.
 fn number(
     values: &[&str],
-    column: Column,
+    column: ScaledColumn,
     sign: &mut DecimalSign,
 ) -> Result<Option<f64>, BadMessage> {
     let value = values[column.at];
@@ -221,7 +221,7 @@ fn number(
 /// `None` when all three are empty.
 fn vector(
     values: &[&str],
-    columns: &[Column; 3],
+    columns: &[ScaledColumn; 3],
     sign: &mut DecimalSign,
 ) -> Result<Option<Vector3<f64>>, BadMessage> {
     let [x, y, z] = columns.map(|column| number(values, column, sign));

@@ -37,11 +37,11 @@ const CHANGE: (f64, f64) = (0.1, 8.0);
 const SAFETY: f64 = 0.85;
 
 /// Travel, m, and impulse in the same unit (times α), at one instant.
-pub(super) type Coupled = Vector2<f64>;
+pub(super) type CoupledState = Vector2<f64>;
 
 /// Rate of change of both unknowns per second, and its derivative by both.
 pub(super) struct Slope {
-    pub rate: Coupled,
+    pub rate: CoupledState,
     pub jacobian: Matrix2<f64>,
 }
 
@@ -67,11 +67,11 @@ pub(super) fn integrate(
     end: f64,
     sizes: Sizes,
     relative: f64,
-    slope: impl Fn(&Coupled) -> Slope,
-) -> Result<Coupled, DynamicsError> {
-    let (mut y, mut time, mut farthest) = (Coupled::zeros(), 0.0, 0.0_f64);
+    slope: impl Fn(&CoupledState) -> Slope,
+) -> Result<CoupledState, DynamicsError> {
+    let (mut y, mut time, mut farthest) = (CoupledState::zeros(), 0.0, 0.0_f64);
     // accumulated roundings of this step and the steps before
-    let mut noise = Coupled::zeros();
+    let mut noise = CoupledState::zeros();
     // the first step changes little, and the next ones grow from there
     let Slope { rate, jacobian } = slope(&y);
     let fastest = jacobian
@@ -81,7 +81,7 @@ pub(super) fn integrate(
     let mut step = end.min(FIRST / fastest.max(f64::MIN_POSITIVE));
     for _ in 0..MOST_STEPS {
         if time >= end {
-            let allowed = Coupled::new(
+            let allowed = CoupledState::new(
                 (relative * farthest).max(sizes.rounding),
                 relative * sizes.turning,
             );
@@ -94,8 +94,8 @@ pub(super) fn integrate(
         }
         let is_last = step >= end - time;
         let dt = if is_last { end - time } else { step };
-        let size = |next: &Coupled| {
-            Coupled::new(
+        let size = |next: &CoupledState| {
+            CoupledState::new(
                 farthest.max(next.x.abs()).max(sizes.rounding / AGREEMENT),
                 sizes
                     .turning
@@ -114,7 +114,10 @@ pub(super) fn integrate(
                 let grown = [&y, &next].map(|y| propagator(&slope(y).jacobian, dt).abs() * noise);
                 noise = grown[0].sup(&grown[1])
                     + f64::EPSILON
-                        * Coupled::new(farthest.max(next.x.abs()), sizes.turning.max(next.y.abs()));
+                        * CoupledState::new(
+                            farthest.max(next.x.abs()),
+                            sizes.turning.max(next.y.abs()),
+                        );
                 y = next;
                 farthest = farthest.max(y.x.abs());
                 time = if is_last { end } else { time + dt };
@@ -173,11 +176,11 @@ fn propagator(jacobian: &Matrix2<f64>, dt: f64) -> Matrix2<f64> {
 
 /// One step; `None` if Newton's method does not converge.
 fn radau(
-    y: &Coupled,
+    y: &CoupledState,
     dt: f64,
-    size: impl Fn(&Coupled) -> Coupled,
-    slope: &impl Fn(&Coupled) -> Slope,
-) -> Option<Coupled> {
+    size: impl Fn(&CoupledState) -> CoupledState,
+    slope: &impl Fn(&CoupledState) -> Slope,
+) -> Option<CoupledState> {
     let weights = coefficients() * dt;
     let mut z = SVector::<f64, 6>::zeros();
     let mut last = f64::INFINITY;

@@ -4,7 +4,7 @@
 //! h = (p − b)·n      F* = f(h) n      db/dt = α ((F − F*)·n) a      dn/dt = β (F* × F) × n
 //! ```
 //!
-//! p and F are constant over the step; a is n(0), or F/|F| ([`Along`]). Two sub-flows have exact
+//! p and F are constant over the step; a is n(0), or F/|F| ([`MotionDirection`]). Two sub-flows have exact
 //! solutions:
 //!
 //! - **position**, n frozen: b = b₀ + s a, ds/dt = α (F·n − f(h₀ − (a·n) s)). With n, a·n is
@@ -73,7 +73,7 @@ words! {
 words! {
     /// Direction a of the motion of b*.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-    pub enum Along {
+    pub enum MotionDirection {
         /// n*(0) \[paper, Eq 6\]: n* at the first touch of the face, or at the start of the step if
         /// no other is given.
         InitialNormal = "normal0",
@@ -123,7 +123,7 @@ pub struct DynamicsParams {
     /// Order and cost of the step.
     pub rule: StepRule,
     /// Direction of motion.
-    pub along: Along,
+    pub along: MotionDirection,
     /// Compares h with f⁻¹(F·n) ([`ContactModel::rigid_offset`]) instead of 0, so that a face at
     /// rest lies at the tip whatever the force; clamps F·n between f(0) and [`LARGEST_SHARE`] ·
     /// f_max.
@@ -139,7 +139,7 @@ impl Default for DynamicsParams {
             alpha_m_per_n_s: 0.1,
             beta_per_n2_s: 0.1,
             rule: StepRule::Lie,
-            along: Along::Force,
+            along: MotionDirection::Force,
             take_out_rigid_offset: true,
         }
     }
@@ -218,7 +218,7 @@ impl FaceDynamics {
         self.step_from(&face.n, face, p, force, dt)
     }
 
-    /// As [`Self::step`], with the n*(0) of an earlier step: [`Along::InitialNormal`] keeps b* on
+    /// As [`Self::step`], with the n*(0) of an earlier step: [`MotionDirection::InitialNormal`] keeps b* on
     /// its line of that step. Uses n*(0) unchecked, |n*(0)| = 1.
     ///
     /// # Errors
@@ -245,7 +245,7 @@ impl FaceDynamics {
         if dt < 0.0 {
             return Err(DynamicsError::BadTimeStep { dt_s: dt });
         }
-        let along = if self.params.along == Along::Force && magnitude > 0.0 {
+        let along = if self.params.along == MotionDirection::Force && magnitude > 0.0 {
             towards
         } else {
             *initial_normal
@@ -380,7 +380,7 @@ impl FaceDynamics {
         // the impulse times α is a length, as the travel is
         let unit = if alpha > 0.0 { alpha } else { 1.0 };
         let normal = |impulse: f64| turn(&touch.n, &touch.towards, turning / unit * impulse);
-        let slope = |y: &bounded::Coupled| {
+        let slope = |y: &bounded::CoupledState| {
             let n = normal(y.y);
             let turned = turning / unit * (touch.towards - touch.towards.dot(&n) * n);
             let (force, h) = self.compared(&n, touch, y.x);

@@ -96,7 +96,7 @@ struct Arc {
 }
 
 /// |D|, ∫ 1/(1 + eᵘ) d|T|, ∫ 1/(1 + e⁻ᵘ) d|T|.
-type Passed = (f64, f64, f64);
+type FlowIntegrals = (f64, f64, f64);
 
 impl Arc {
     #[inline]
@@ -124,7 +124,7 @@ impl Arc {
 
     /// Straight parts first, if they reach that far, then the curved one.
     #[inline]
-    fn after(self, t: f64) -> Passed {
+    fn after(self, t: f64) -> FlowIntegrals {
         let (span, down) = (t.abs(), t < 0.0);
         if self.u < -SATURATED {
             let edge = self.rest.min(1.0).ln() - SATURATED;
@@ -145,7 +145,7 @@ impl Arc {
 
     /// u moves at the constant `slope`, at most to the `edge`; the rest of the time goes on from
     /// there.
-    fn straight(self, span: f64, down: bool, slope: f64, edge: Option<f64>) -> Passed {
+    fn straight(self, span: f64, down: bool, slope: f64, edge: Option<f64>) -> FlowIntegrals {
         let sign = if down { -1.0 } else { 1.0 };
         let free = self.u + sign * slope * span;
         let edge = edge.filter(|&edge| sign * (free - edge) > 0.0);
@@ -167,12 +167,12 @@ impl Arc {
     }
 
     /// c = 0 and E₀ beyond the largest number: e^u grows linearly.
-    fn without_force(self, t: f64) -> Passed {
+    fn without_force(self, t: f64) -> FlowIntegrals {
         let rise = (t * (-self.u).exp()).ln_1p().abs();
         (rise, rise, t.abs())
     }
 
-    fn curved(self, span: f64, down: bool) -> Passed {
+    fn curved(self, span: f64, down: bool) -> FlowIntegrals {
         let sign = if down { -1.0 } else { 1.0 };
         let total = self.rest * span;
         // the rate falls while u rises
@@ -303,7 +303,7 @@ impl Arc {
     /// Both integrals: from the sums D + L = (1 − c) T and ∫ 1/(1 + eᵘ) d|T| = |D| + c |T| unless
     /// they cancel.
     #[inline]
-    fn passed(&self, displacement: f64, total: f64, span: f64, sign: f64) -> Passed {
+    fn passed(&self, displacement: f64, total: f64, span: f64, sign: f64) -> FlowIntegrals {
         let (low, high) = (displacement + self.c * span, total - displacement);
         let low = if low > CANCELLED * displacement {
             low

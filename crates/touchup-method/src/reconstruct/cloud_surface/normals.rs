@@ -19,7 +19,7 @@ const RING_SPACINGS: f64 = 1.382;
 
 /// Local geometry at a point, from its neighbours.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Neighbourhood {
+pub(super) struct PointNeighbourhood {
     /// unit, of either sign
     pub normal: Vector3<f64>,
     /// distance of neighbouring points, m
@@ -30,7 +30,7 @@ pub(super) struct Neighbourhood {
     pub nearest: [u32; TURNED],
 }
 
-impl Neighbourhood {
+impl PointNeighbourhood {
     /// Neighbourhoods of all points.
     ///
     /// - `positions`: more than [`PLANE`].
@@ -75,7 +75,7 @@ impl Neighbourhood {
 /// Outward unit normal of each point, and the source of the orientation.
 pub(super) fn oriented(
     points: &UsablePoints,
-    near: &[Neighbourhood],
+    near: &[PointNeighbourhood],
 ) -> (Vec<Vector3<f64>>, NormalSource) {
     let given: Vec<_> = points
         .normals
@@ -133,7 +133,11 @@ fn is_finite(v: &Vector3<f64>) -> bool {
 
 /// Orients neighbours consistently along a minimum spanning tree with cost 1 − |nᵢ·nⱼ| [Hoppe
 /// 1992]; then each connected piece towards the scanner or, failing this, out of the piece.
-fn turn_along_tree(points: &UsablePoints, near: &[Neighbourhood], normals: &mut [Vector3<f64>]) {
+fn turn_along_tree(
+    points: &UsablePoints,
+    near: &[PointNeighbourhood],
+    normals: &mut [Vector3<f64>],
+) {
     let mut pairs: Vec<(u32, [u32; 2])> = Vec::with_capacity(near.len() * TURNED);
     for (at, found) in (0u32..).zip(near) {
         for other in found.nearest {

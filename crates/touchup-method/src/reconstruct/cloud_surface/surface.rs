@@ -4,7 +4,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::clean::UsablePoints;
 use super::moving_least_squares::OrientedPoints;
-use super::normals::{Neighbourhood, oriented};
+use super::normals::{PointNeighbourhood, oriented};
 use super::summary::CloudSummary;
 use crate::reconstruct::field::lattice::Lattice;
 use touchup_geometry::mesh::{PointCloud, PointTree, Workers, map_by};
@@ -101,7 +101,7 @@ pub fn surface_of_cloud(
         });
     }
     let tree = PointTree::new(&points.positions);
-    let near = Neighbourhood::of_all(&points.positions, &tree, workers);
+    let near = PointNeighbourhood::of_all(&points.positions, &tree, workers);
     let spacing = median(near.iter().map(|near| near.spacing).collect());
     let noise = median(near.iter().map(|near| near.noise).collect());
     let (normals, source) = oriented(&points, &near);

@@ -62,7 +62,7 @@ pub(in crate::reconstruct) fn contour_in(
     cut: &Cut,
     crossing: impl FnMut(&Edge) -> Crossing,
 ) -> Patch {
-    let mut skin = Skin {
+    let mut skin = SurfaceBuilder {
         lattice,
         region,
         core,
@@ -83,7 +83,7 @@ pub(in crate::reconstruct) fn contour_in(
     for at in 0..skin.cells.len() as u32 {
         skin.close_edges(at);
     }
-    let Skin {
+    let SurfaceBuilder {
         mut patch,
         fans,
         moved,
@@ -120,8 +120,8 @@ impl SurfaceCell {
     }
 }
 
-/// The skin under construction.
-struct Skin<'a, F> {
+/// The surface under construction.
+struct SurfaceBuilder<'a, F> {
     lattice: &'a Lattice,
     region: &'a LatticeRegion,
     core: &'a CellBox,
@@ -144,7 +144,7 @@ struct Skin<'a, F> {
     patch: Patch,
 }
 
-impl<F: FnMut(&Edge) -> Crossing> Skin<'_, F> {
+impl<F: FnMut(&Edge) -> Crossing> SurfaceBuilder<'_, F> {
     /// Finds the loops of a cell and places their vertices.
     fn take_cell(&mut self, node: LatticeNode) {
         let Some(material) = self.material(node) else {

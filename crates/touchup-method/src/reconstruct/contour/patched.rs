@@ -80,7 +80,7 @@ pub enum Support {
 
 /// A scan with its touched part remeshed.
 #[derive(Clone, Debug)]
-pub struct Patched {
+pub struct PatchedMesh {
     /// untouched vertices and faces keep their ids
     pub mesh: TriMesh,
     /// the support of each vertex, by id
@@ -118,7 +118,7 @@ impl Support {
     }
 }
 
-impl Patched {
+impl PatchedMesh {
     /// Columns of a file for each vertex beside its position, by id: `touched`, `support`, and
     /// `sigma_mm` if known.
     pub fn columns(&self) -> Vec<(&'static str, Vec<f32>)> {
@@ -164,7 +164,7 @@ mod tests {
             Support::Unreachable,
         ];
         let sigma = vec![0.6e-3, 2e-6, 0.1e-3, 0.25e-3];
-        let mut patched = Patched {
+        let mut patched = PatchedMesh {
             mesh,
             support,
             sigma,

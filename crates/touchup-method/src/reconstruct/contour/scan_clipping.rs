@@ -31,7 +31,7 @@ pub(in crate::reconstruct) struct TraceSegment {
 
 /// Crossing of the scan and an edge of the lattice.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::reconstruct) struct Pierced {
+pub(in crate::reconstruct) struct ScanCrossing {
     pub vertex: u32,
     pub normal: Vector3<f64>,
     face: FaceId,
@@ -52,7 +52,7 @@ pub struct Cut {
     pitch: f64,
     /// the segments on each square on the rim of the region
     segments: CellTable<Square, Vec<TraceSegment>>,
-    pierced: CellTable<Edge, Pierced>,
+    pierced: CellTable<Edge, ScanCrossing>,
 }
 
 /// Buffers reused from face to face.
@@ -118,7 +118,7 @@ impl Cut {
     }
 
     /// Crossing of the scan and an edge on the rim of the region.
-    pub(in crate::reconstruct) fn pierced(&self, edge: &Edge) -> Option<&Pierced> {
+    pub(in crate::reconstruct) fn pierced(&self, edge: &Edge) -> Option<&ScanCrossing> {
         self.pierced.get(edge)
     }
 
@@ -177,7 +177,7 @@ impl Cut {
             .insert_with(key, || loosened(key, pieces.position(point), self.pitch));
         vertex_of[point as usize] = vertex;
         if let VertexKey::Pierce(edge, face) = key {
-            let new = || Pierced {
+            let new = || ScanCrossing {
                 vertex,
                 normal: pieces.normal,
                 face,

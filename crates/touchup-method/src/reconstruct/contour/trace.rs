@@ -3,7 +3,7 @@
 use nalgebra::{Point2, Point3};
 
 use crate::reconstruct::contour::patched::OpenSquare;
-use crate::reconstruct::contour::scan_clipping::{Cut, Pierced, TraceSegment};
+use crate::reconstruct::contour::scan_clipping::{Cut, ScanCrossing, TraceSegment};
 use crate::reconstruct::field::lattice::{
     Edge, LatticeNode, NodeValues, Square, VertexKey, across,
 };
@@ -78,7 +78,7 @@ impl Cut {
         &self,
         edge: &Edge,
         values: &NodeValues,
-    ) -> Option<&Pierced> {
+    ) -> Option<&ScanCrossing> {
         let pierced = self.pierced(edge).filter(|pierced| !pierced.is_repeated)?;
         let [start, end] = [edge.node, edge.end()].map(|node| values.get(&node).map(|f| *f < 0.0));
         let outward = pierced.normal[edge.axis as usize];

@@ -33,7 +33,7 @@ pub struct MeanContact {
 
 /// Outcome of adding a contact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Verdict {
+pub enum ContactVerdict {
     /// part of the mean of its place
     Taken,
     /// in contradiction to its place, rejected
@@ -69,7 +69,7 @@ struct Rival {
 
 /// State of a mean beside the data for queries.
 #[derive(Clone, Debug)]
-struct Kept {
+struct MeanState {
     bin: Bin,
     /// the cell in [`ContactMap::nearby`]
     home: LatticeNode,
@@ -83,7 +83,7 @@ struct Kept {
     reported: (Point3<f64>, Vector3<f64>),
 }
 
-impl Kept {
+impl MeanState {
     /// Weight in queries.
     fn weight(&self) -> f64 {
         if self.is_refuted || self.is_mixed {
@@ -95,7 +95,7 @@ impl Kept {
 }
 
 /// A mean before a stroke; `None` if it is new.
-type Past = Option<(Kept, MeanContact)>;
+type EarlierMean = Option<(MeanState, MeanContact)>;
 
 /// Contacts that contradict a mean and agree with each other.
 #[derive(Clone, Debug, Default)]
@@ -112,7 +112,7 @@ pub struct ContactMap {
     gate: Option<GateParams>,
     /// the means of each cell
     of_cell: CellTable<LatticeNode, Vec<u32>>,
-    kept: Vec<Kept>,
+    kept: Vec<MeanState>,
     means: Vec<MeanContact>,
     nearby: CellTable<LatticeNode, Vec<u32>>,
     /// rejected contacts
@@ -121,7 +121,7 @@ pub struct ContactMap {
     last: Option<(u32, i64)>,
     /// means that are new or moved since the last report
     changed: CellTable<u32, ()>,
-    history: History<u32, Past>,
+    history: History<u32, EarlierMean>,
 }
 
 /// Range of normal components that share a mean.
@@ -167,7 +167,7 @@ impl ContactMap {
     }
 
     /// Adds a contact to the mean of its cell, unless it contradicts its place.
-    pub fn add(&mut self, contact: &SurfaceContact) -> Verdict {
+    pub fn add(&mut self, contact: &SurfaceContact) -> ContactVerdict {
         self.outliers.contacts += 1;
         let bin = self.bin_of(contact);
         let own = self.find(&bin);
@@ -177,7 +177,7 @@ impl ContactMap {
             return self.contest(&rival, contact, &bin, &gate);
         }
         let index = self.place(own, &bin, contact);
-        let Kept { sums, rejected, .. } = &mut self.kept[index as usize];
+        let MeanState { sums, rejected, .. } = &mut self.kept[index as usize];
         sums.add(contact);
         if let Some(gate) = self.gate
             && sums
@@ -191,7 +191,7 @@ impl ContactMap {
         if self.kept[index as usize].sums.weight >= LEAST_EVIDENCE {
             self.last = Some((index, contact.stamp_ns));
         }
-        Verdict::Taken
+        ContactVerdict::Taken
     }
 
     /// Whether a contact contradicts its place, and would be rejected.
@@ -299,7 +299,7 @@ impl ContactMap {
         contact: &SurfaceContact,
         bin: &Bin,
         gate: &GateParams,
-    ) -> Verdict {
+    ) -> ContactVerdict {
         let roughness = ROUGHNESS * self.cell;
         self.note_mean(rival.index);
         let rejected = self.kept[rival.index as usize]
@@ -319,7 +319,7 @@ impl ContactMap {
         if is_second {
             let sums = std::mem::take(sums);
             self.move_to(rival.index, sums, contact, bin, gate.sigmas);
-            return Verdict::Relocated;
+            return ContactVerdict::Relocated;
         }
         let SurfaceContact {
             stamp_ns,
@@ -341,7 +341,7 @@ impl ContactMap {
             },
             gate.window_ns,
         );
-        Verdict::Rejected
+        ContactVerdict::Rejected
     }
 
     /// Empties the means that a contact contradicts and puts the rejected contacts in the contact's
@@ -391,7 +391,7 @@ impl ContactMap {
         } = *contact;
         let index = self.means.len() as u32;
         self.history.note(index, || None);
-        let kept = Kept {
+        let kept = MeanState {
             bin: *bin,
             home: voxel_of(&point, self.reach),
             sums: ContactStatistics::default(),
@@ -423,7 +423,7 @@ impl ContactMap {
     }
 
     /// Adds a mean.
-    fn push(&mut self, kept: Kept, mean: MeanContact) {
+    fn push(&mut self, kept: MeanState, mean: MeanContact) {
         let index = self.means.len() as u32;
         self.of_cell.get_or_default(kept.bin.cell).push(index);
         self.nearby.get_or_default(kept.home).push(index);
@@ -432,7 +432,7 @@ impl ContactMap {
     }
 
     /// Removes the latest mean.
-    fn pop(&mut self) -> Option<(Kept, MeanContact)> {
+    fn pop(&mut self) -> Option<(MeanState, MeanContact)> {
         let (kept, mean) = (self.kept.pop()?, self.means.pop()?);
         self.of_cell.get_or_default(kept.bin.cell).pop();
         self.nearby.get_or_default(kept.home).pop();
@@ -476,7 +476,7 @@ impl ContactMap {
     }
 
     /// Exchanges a mean with its kept state; the last insertion first.
-    fn swap(&mut self, index: u32, past: &mut Past) {
+    fn swap(&mut self, index: u32, past: &mut EarlierMean) {
         let at = index as usize;
         match past.take() {
             None => *past = self.pop(),
@@ -707,7 +707,7 @@ mod tests {
     }
 
     /// A pass of eight contacts at height `z` (m) from `stamp_ns` on; verdict on the last contact.
-    fn pass(store: &mut ContactMap, z: f64, stamp_ns: i64) -> Verdict {
+    fn pass(store: &mut ContactMap, z: f64, stamp_ns: i64) -> ContactVerdict {
         let sigma = ContactSigma {
             noise: 10e-6,
             ..ContactSigma::default()
@@ -740,14 +740,20 @@ mod tests {
                 });
                 heights
             };
-            assert_eq!(pass(&mut store, 0.0, second), Verdict::Taken);
-            assert_eq!(pass(&mut store, 0.01e-3, 2 * second), Verdict::Taken);
+            assert_eq!(pass(&mut store, 0.0, second), ContactVerdict::Taken);
+            assert_eq!(pass(&mut store, 0.01e-3, 2 * second), ContactVerdict::Taken);
             assert_eq!(near(&store), [105.0], "what agrees is averaged");
-            assert_eq!(pass(&mut store, moved, 3 * second), Verdict::Rejected);
+            assert_eq!(
+                pass(&mut store, moved, 3 * second),
+                ContactVerdict::Rejected
+            );
             assert_eq!((near(&store), store.outliers.rejected), (vec![105.0], 8));
             // after a pass that confirms the mean, the next contradiction is the first again
-            assert_eq!(pass(&mut store, 0.0, 4 * second), Verdict::Taken);
-            assert_eq!(pass(&mut store, moved, 5 * second), Verdict::Rejected);
+            assert_eq!(pass(&mut store, 0.0, 4 * second), ContactVerdict::Taken);
+            assert_eq!(
+                pass(&mut store, moved, 5 * second),
+                ContactVerdict::Rejected
+            );
             pass(&mut store, moved, 6 * second);
             assert_eq!(store.outliers.relocated, 1);
             assert_eq!(near(&store), [((100e-6 + moved) * 1e6).round()]);

@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use crate::reconstruct::evidence::voxel_set::{Keyed, VoxelSet};
+use crate::reconstruct::evidence::voxel_set::{VoxelElement, VoxelSet};
 use crate::reconstruct::field::lattice::{CellBox, LatticeNode};
 use crate::reconstruct::incremental::history::Direction;
 use crate::reconstruct::table::Key;
@@ -52,14 +52,14 @@ impl Key for Posture {
     }
 }
 
-impl Keyed for Point3<f64> {
+impl VoxelElement for Point3<f64> {
     type Key = LatticeNode;
     fn key(&self, cell: f64) -> LatticeNode {
         voxel_of(self, cell)
     }
 }
 
-impl Keyed for TipPlace {
+impl VoxelElement for TipPlace {
     type Key = Posture;
     fn key(&self, cell: f64) -> Posture {
         let lean = [self.axis.x, self.axis.y, self.axis.z].map(|x| (x / LEAN).floor() as i8);

@@ -2,7 +2,7 @@
 
 use nalgebra::Point3;
 
-use crate::reconstruct::evidence::contact_map::Verdict;
+use crate::reconstruct::evidence::contact_map::ContactVerdict;
 use crate::reconstruct::evidence::touches::{SurfaceContact, TipTouch};
 use crate::reconstruct::field::lattice::LatticeNode;
 use crate::reconstruct::incremental::history::Direction;
@@ -73,7 +73,7 @@ impl ProbedLog {
         &mut self,
         touch: &TipTouch,
         contact: &SurfaceContact,
-        verdict: Verdict,
+        verdict: ContactVerdict,
     ) {
         let is_of_last = self
             .points
@@ -108,7 +108,7 @@ impl ProbedLog {
             calibration: contact.sigma.calibration,
             place: contact.sigma.place,
             weight: contact.weight,
-            is_rejected: verdict == Verdict::Rejected,
+            is_rejected: verdict == ContactVerdict::Rejected,
         });
     }
 
@@ -180,7 +180,7 @@ mod tests {
             contact: Some(contact),
             state: TouchState::Contact,
         };
-        log.note(&touch, &contact, Verdict::Taken);
+        log.note(&touch, &contact, ContactVerdict::Taken);
     }
 
     #[test]
@@ -241,7 +241,7 @@ mod tests {
                 contact: Some(contact),
                 state: TouchState::Contact,
             };
-            log.note(&touch, &contact, Verdict::Taken);
+            log.note(&touch, &contact, ContactVerdict::Taken);
             most = most.max(log.points().len());
         }
         assert_eq!(log.of_cell.len(), 49);

@@ -2,7 +2,7 @@
 
 use nalgebra::Point3;
 
-use crate::reconstruct::evidence::contact_map::{ContactMap, Verdict};
+use crate::reconstruct::evidence::contact_map::{ContactMap, ContactVerdict};
 use crate::reconstruct::evidence::double_contact::{is_mixed, split};
 use crate::reconstruct::evidence::free_space::FreeSpace;
 use crate::reconstruct::evidence::probed_log::ProbedLog;
@@ -93,8 +93,8 @@ impl TouchHistory {
             }
             let verdict = self.contacts.add(contact);
             self.probed.note(touch, contact, verdict);
-            is_accepted |= verdict != Verdict::Rejected;
-            if verdict == Verdict::Relocated {
+            is_accepted |= verdict != ContactVerdict::Rejected;
+            if verdict == ContactVerdict::Relocated {
                 self.free_space
                     .forget(&contact.point, FORGOTTEN * self.radius);
             }

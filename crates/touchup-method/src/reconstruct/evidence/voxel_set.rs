@@ -11,7 +11,7 @@ const MOST_KEPT: usize = 2000;
 type Bucket<T> = Option<Vec<T>>;
 
 /// An element of a voxel set, which holds one per key.
-pub(in crate::reconstruct) trait Keyed: Copy {
+pub(in crate::reconstruct) trait VoxelElement: Copy {
     /// a small cell, and other distinctions between its elements
     type Key: Key;
     /// Key for small cells of edge `cell` (m).
@@ -20,7 +20,7 @@ pub(in crate::reconstruct) trait Keyed: Copy {
 
 /// Elements by their cubes.
 #[derive(Clone, Debug)]
-pub(in crate::reconstruct) struct VoxelSet<T: Keyed> {
+pub(in crate::reconstruct) struct VoxelSet<T: VoxelElement> {
     cell: f64,
     /// whether the set holds an element with this key
     is_kept: CellTable<T::Key, bool>,
@@ -28,7 +28,7 @@ pub(in crate::reconstruct) struct VoxelSet<T: Keyed> {
     history: History<LatticeNode, Bucket<T>>,
 }
 
-impl<T: Keyed> VoxelSet<T> {
+impl<T: VoxelElement> VoxelSet<T> {
     /// An empty set, with small cells of edge `cell` (m).
     pub fn new(cell: f64) -> Self {
         Self {
@@ -132,7 +132,7 @@ impl<T: Keyed> VoxelSet<T> {
 mod tests {
     use super::*;
 
-    impl Keyed for u32 {
+    impl VoxelElement for u32 {
         type Key = u32;
         fn key(&self, _: f64) -> u32 {
             *self

@@ -36,7 +36,7 @@ impl GridChanges {
 
 /// Changes from a renewal.
 #[derive(Clone, Debug, Default)]
-pub(in crate::reconstruct) struct Changed {
+pub(in crate::reconstruct) struct LatticeChanges {
     /// nodes that are new, or have a new value or source
     pub nodes: Vec<LatticeNode>,
     /// those that affect the surface in the cells around them
@@ -97,7 +97,7 @@ impl ReconstructionGrid {
         evidence: &Evidence<'_>,
         changes: &GridChanges,
         late: &GridChanges,
-    ) -> Changed {
+    ) -> LatticeChanges {
         self.renewals += 1;
         let mut look = EarlierStates::default();
         if !self.nodes.is_empty() {
@@ -142,7 +142,11 @@ impl ReconstructionGrid {
     }
 
     /// Evaluates further unknown nodes in and around `cells`: a filled surface goes on there.
-    pub fn look_further(&mut self, evidence: &Evidence<'_>, cells: &LatticeRegion) -> Changed {
+    pub fn look_further(
+        &mut self,
+        evidence: &Evidence<'_>,
+        cells: &LatticeRegion,
+    ) -> LatticeChanges {
         let (mut look, mut area) = (EarlierStates::default(), CellBox::EMPTY);
         for (cell, ()) in cells.iter() {
             for node in (CellBox { lo: cell, hi: cell }).widened(1, 2).iter() {
@@ -408,7 +412,7 @@ fn moved(node: &LatticeNode, offset: &LatticeNode) -> LatticeNode {
 }
 
 /// Cells that a renewal may have added to the region or removed from it.
-pub(in crate::reconstruct) fn cells_of(changed: &Changed) -> LatticeRegion {
+pub(in crate::reconstruct) fn cells_of(changed: &LatticeChanges) -> LatticeRegion {
     let around = changed
         .nodes
         .iter()

@@ -176,15 +176,15 @@ fn neighbours(grid: &ReconstructionGrid, at: u32, numbers: &Numbers) -> [u32; 6]
 /// Drops material and void without evidence: a piece of one sign, within the nodes at hand, neither
 /// touched nor swept, or smaller than a ball can resolve. Returns whether there was any.
 fn drop_islands(grid: &mut ReconstructionGrid, at: &[u32], numbers: &Numbers) -> bool {
-    let mut seen = vec![Visited::Outside; grid.nodes.len()];
+    let mut seen = vec![VisitState::Outside; grid.nodes.len()];
     at.iter()
-        .for_each(|&at| seen[at as usize] = Visited::NotYet);
+        .for_each(|&at| seen[at as usize] = VisitState::NotYet);
     let (mut island, mut has_dropped) = (Vec::new(), false);
     for &start in at {
-        if seen[start as usize] != Visited::NotYet {
+        if seen[start as usize] != VisitState::NotYet {
             continue;
         }
-        seen[start as usize] = Visited::Yes;
+        seen[start as usize] = VisitState::Yes;
         island.clear();
         island.push(start);
         if !is_attached(grid, &mut island, &mut seen, numbers) {
@@ -200,7 +200,7 @@ fn drop_islands(grid: &mut ReconstructionGrid, at: &[u32], numbers: &Numbers) ->
 
 /// Visit state of a node while gathering pieces.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Visited {
+enum VisitState {
     /// not among the nodes at hand
     Outside,
     NotYet,
@@ -212,7 +212,7 @@ enum Visited {
 fn is_attached(
     grid: &ReconstructionGrid,
     piece: &mut Vec<u32>,
-    seen: &mut [Visited],
+    seen: &mut [VisitState],
     numbers: &Numbers,
 ) -> bool {
     let (mut next, mut is_touched, mut goes_on) = (0, false, false);
@@ -224,9 +224,9 @@ fn is_attached(
         goes_on |= around.contains(&NONE);
         for other in around.into_iter().filter(|&other| other != NONE) {
             let is_same = (grid.nodes.entry(other).1.value < 0.0) == (state.value < 0.0);
-            goes_on |= is_same && seen[other as usize] == Visited::Outside;
-            if is_same && seen[other as usize] == Visited::NotYet {
-                seen[other as usize] = Visited::Yes;
+            goes_on |= is_same && seen[other as usize] == VisitState::Outside;
+            if is_same && seen[other as usize] == VisitState::NotYet {
+                seen[other as usize] = VisitState::Yes;
                 piece.push(other);
             }
         }

@@ -6,7 +6,7 @@ use crate::reconstruct::LatticeRegion;
 use crate::reconstruct::contour::coarsening::CoarseBlocks;
 use crate::reconstruct::contour::patched::{Patch, Support};
 use crate::reconstruct::field::lattice::{CellBox, LatticeNode, Owner, VertexKey};
-use crate::reconstruct::incremental::remesh::{Remesh, Renewed};
+use crate::reconstruct::incremental::remesh::{Remesh, RenewedFaces};
 use crate::reconstruct::table::CellTable;
 use touchup_geometry::mesh::{FaceId, TriMesh};
 
@@ -60,13 +60,13 @@ pub(in crate::reconstruct) struct PublishedPatch {
     faces: CellTable<Owner, Vec<NamedFace>>,
     /// the owners on the lattice, by blocks of cells
     blocks: CellTable<LatticeNode, Vec<Owner>>,
-    vertices: CellTable<VertexKey, Placed>,
+    vertices: CellTable<VertexKey, PublishedVertex>,
     /// blocks with merged faces
     coarse: CoarseBlocks,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
-struct Placed {
+struct PublishedVertex {
     position: Point3<f64>,
     support: Support,
     /// number of face corners here
@@ -102,7 +102,7 @@ impl PublishedPatch {
     /// - `coarse`: blocks of its merged faces.
     pub fn take_all(
         &mut self,
-        mut renewed: Renewed,
+        mut renewed: RenewedFaces,
         coarse: CoarseBlocks,
         remesh: &Remesh,
         scan: &TriMesh,
@@ -117,7 +117,7 @@ impl PublishedPatch {
     /// Adopts a renewal; returns the differences from before.
     ///
     /// - `remesh`: source of the renewal.
-    pub fn take(&mut self, renewed: &Renewed, remesh: &Remesh, scan: &TriMesh) -> PatchDelta {
+    pub fn take(&mut self, renewed: &RenewedFaces, remesh: &Remesh, scan: &TriMesh) -> PatchDelta {
         let mut draft = Draft::default();
         let core = self.coarse.around(&renewed.core);
         self.coarse.refine(&renewed.core);
@@ -245,7 +245,7 @@ impl PublishedPatch {
             if let VertexKey::Scan(vertex) = key {
                 placed.position = scan.position(vertex);
             }
-            let Placed {
+            let PublishedVertex {
                 position, support, ..
             } = *placed;
             draft.delta.vertices.push(PatchVertex {

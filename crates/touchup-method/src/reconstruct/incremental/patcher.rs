@@ -4,7 +4,7 @@ use nalgebra::{Point3, Vector3};
 
 use crate::parameters;
 use crate::reconstruct::contour::coarsening::{CoarseBlocks, coarsen};
-use crate::reconstruct::contour::patched::{Patch, Patched, Support};
+use crate::reconstruct::contour::patched::{Patch, PatchedMesh, Support};
 use crate::reconstruct::evidence::agreement::Agreement;
 use crate::reconstruct::evidence::contact_map::{ContactMap, GateParams};
 use crate::reconstruct::evidence::contact_uncertainty::UncertaintyParams;
@@ -23,7 +23,7 @@ use crate::reconstruct::field::uncertainty::vertex_sigma;
 use crate::reconstruct::field::unreachable::mark_unreachable;
 use crate::reconstruct::incremental::delta::{PatchDelta, PatchVertex, PublishedPatch};
 use crate::reconstruct::incremental::history::Direction;
-use crate::reconstruct::incremental::remesh::{Remesh, Renewed};
+use crate::reconstruct::incremental::remesh::{Remesh, RenewedFaces};
 use crate::stylus::{ContactSample, ProbedPoint, SettingError, TipBody, TipShape};
 use touchup_geometry::mesh::{FaceTree, MeshError, Region, TriMesh};
 
@@ -468,12 +468,12 @@ impl Patcher {
     ///
     /// # Errors
     /// [`MeshError::TooMany`] when 32-bit ids do not suffice.
-    pub fn patched(&mut self, scan: &TriMesh, tree: &FaceTree) -> Result<Patched, MeshError> {
+    pub fn patched(&mut self, scan: &TriMesh, tree: &FaceTree) -> Result<PatchedMesh, MeshError> {
         let fitting = self.tolerance();
         let usual = std::mem::replace(&mut self.params.tolerance, fitting);
         let patched = self.patched_within_tolerance(scan, tree);
         self.params.tolerance = usual;
-        patched.map(|patched| Patched {
+        patched.map(|patched| PatchedMesh {
             is_coarser: patched.tolerance > usual,
             ..patched
         })
@@ -483,11 +483,11 @@ impl Patcher {
         &mut self,
         scan: &TriMesh,
         tree: &FaceTree,
-    ) -> Result<Patched, MeshError> {
+    ) -> Result<PatchedMesh, MeshError> {
         self.history.contacts.note_all();
         self.update(scan, tree);
         let kept = KeptDetail::of(&self.evidence(scan, tree, None));
-        let (remesh, Renewed { mut patch, .. }) = self.remeshed(scan, tree, kept.as_ref());
+        let (remesh, RenewedFaces { mut patch, .. }) = self.remeshed(scan, tree, kept.as_ref());
         let (known, _) = self.coarsen(&mut patch, &remesh, kept.as_ref(), (scan, tree));
         let (base, moved) = kept.map_or_else(
             || (scan.clone(), Vec::new()),
@@ -512,7 +512,7 @@ impl Patcher {
             .copied()
             .zip(support.iter().copied());
         let sigma = self.sigma(scan, tree, places);
-        Ok(Patched {
+        Ok(PatchedMesh {
             mesh,
             support,
             sigma,
@@ -740,7 +740,7 @@ impl Patcher {
         scan: &TriMesh,
         tree: &FaceTree,
         kept: Option<&KeptDetail>,
-    ) -> (Remesh, Renewed) {
+    ) -> (Remesh, RenewedFaces) {
         let evidence = match kept {
             None => self.evidence(scan, tree, None),
             Some(KeptDetail {

@@ -7,7 +7,7 @@ use crate::reconstruct::contour::dual_contouring::contour_in;
 use crate::reconstruct::contour::patched::{Patch, Support};
 use crate::reconstruct::contour::scan_clipping::{Cut, cells_around, faces_near};
 use crate::reconstruct::evidence::point_evidence::{Evidence, NodeState, Source};
-use crate::reconstruct::field::grid::{Changed, GridChanges, ReconstructionGrid, cells_of};
+use crate::reconstruct::field::grid::{GridChanges, LatticeChanges, ReconstructionGrid, cells_of};
 use crate::reconstruct::field::lattice::{CellBox, Lattice, LatticeNode, VertexKey, node_at};
 use crate::reconstruct::table::CellTable;
 use touchup_geometry::mesh::FaceId;
@@ -38,7 +38,7 @@ pub(in crate::reconstruct) struct Remesh {
 
 /// The new faces in and around a part of the lattice.
 #[derive(Clone, Debug)]
-pub(in crate::reconstruct) struct Renewed {
+pub(in crate::reconstruct) struct RenewedFaces {
     /// cells around which everything is new
     pub core: CellBox,
     /// the new faces around `core`, and incomplete ones beyond
@@ -65,7 +65,7 @@ impl Remesh {
         changes: &GridChanges,
         late: &GridChanges,
         coarse: &CoarseBlocks,
-    ) -> Renewed {
+    ) -> RenewedFaces {
         let mut changed = self.grid.renew(evidence, changes, late);
         let (mut core, mut left) = self.take_pending();
         for _ in 0..if evidence.is_closed {
@@ -138,7 +138,12 @@ impl Remesh {
     ///
     /// - `core`: widened to the dependent cells.
     /// - `left`: receives the cells that leave the region.
-    fn take_up(&mut self, changed: &Changed, core: &mut CellBox, left: &mut Vec<LatticeNode>) {
+    fn take_up(
+        &mut self,
+        changed: &LatticeChanges,
+        core: &mut CellBox,
+        left: &mut Vec<LatticeNode>,
+    ) {
         for node in &changed.at_surface {
             // the slope at a crossing includes the nodes beside it
             core.take_around(node, 2, 1);
@@ -173,7 +178,7 @@ impl Remesh {
         mut core: CellBox,
         left: &[LatticeNode],
         coarse: &CoarseBlocks,
-    ) -> Renewed {
+    ) -> RenewedFaces {
         let mut renewed = self.contoured(evidence, core, left, coarse);
         for _ in 0..if evidence.is_closed {
             UNTIL_CLOSED
@@ -209,7 +214,7 @@ impl Remesh {
         core: CellBox,
         left: &[LatticeNode],
         coarse: &CoarseBlocks,
-    ) -> Renewed {
+    ) -> RenewedFaces {
         let whole = coarse.around(&core);
         let Self {
             grid,
@@ -232,7 +237,7 @@ impl Remesh {
         let patch = contour_in(lattice, region, &whole, &values, &cut, |edge| {
             crossings.at(grid, evidence, edge)
         });
-        Renewed {
+        RenewedFaces {
             core,
             patch,
             scanned,

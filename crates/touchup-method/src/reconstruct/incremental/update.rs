@@ -2,7 +2,7 @@
 
 use crate::reconstruct::evidence::point_evidence::{Evidence, NodeState, Source};
 use crate::reconstruct::field::floating_components::floating_components;
-use crate::reconstruct::field::grid::{Changed, EarlierStates, ReconstructionGrid};
+use crate::reconstruct::field::grid::{EarlierStates, LatticeChanges, ReconstructionGrid};
 use crate::reconstruct::field::harmonic_fill::{end_reach, harmonic_fill, open_cells};
 use crate::reconstruct::field::lattice::{CellBox, LatticeNode, Numbers, stepped};
 
@@ -19,9 +19,9 @@ impl ReconstructionGrid {
         evidence: &Evidence<'_>,
         area: &CellBox,
         before: &EarlierStates,
-    ) -> Changed {
+    ) -> LatticeChanges {
         if area.is_empty() {
-            return Changed::default();
+            return LatticeChanges::default();
         }
         let radius = evidence.params.radius;
         let mut area = area.widened(FILL_MARGIN, FILL_MARGIN);
@@ -44,7 +44,7 @@ impl ReconstructionGrid {
             numbers = Numbers::new(&self.nodes, &area);
             harmonic_fill(self, &at, &numbers, radius);
         }
-        let (mut changed, mut turned) = (Changed::default(), Vec::new());
+        let (mut changed, mut turned) = (LatticeChanges::default(), Vec::new());
         for (&at, was) in at.iter().zip(&was) {
             let (node, now) = *self.nodes.entry(at);
             let state = self.nodes.value_mut(at);

@@ -70,13 +70,13 @@ pub struct ClockEstimator {
     onset_ns: Option<i64>,
     /// mean time between two samples, at the last onset, s
     period: f64,
-    onsets: VecDeque<Onset>,
+    onsets: VecDeque<OnsetWindow>,
     course: CourseClock,
 }
 
 /// Samples around the opening of the gate, and the start of the force, s after it.
 #[derive(Clone, Debug)]
-struct Onset {
+struct OnsetWindow {
     samples: Vec<OnsetSample>,
     begun: f64,
 }
@@ -89,7 +89,7 @@ struct OnsetEntry {
 }
 
 /// −log likelihood of one onset at each delay.
-type Profile = [f64; DELAYS];
+type LikelihoodProfile = [f64; DELAYS];
 
 impl ClockEstimator {
     /// - `stiffness`: of stylus and probe, N/m; `None`: rigid.
@@ -170,7 +170,7 @@ impl ClockEstimator {
         }
         let coarse = self.searched()?;
         let bend = 1.0 / self.stiffness.unwrap_or(f64::INFINITY);
-        let profiles: Vec<Profile> = self
+        let profiles: Vec<LikelihoodProfile> = self
             .onsets
             .iter()
             .filter_map(|onset| onset.profile(coarse, bend))
@@ -178,7 +178,7 @@ impl ClockEstimator {
         if profiles.len() < LEAST_ONSETS {
             return None;
         }
-        let sum: Profile =
+        let sum: LikelihoodProfile =
             std::array::from_fn(|at| profiles.iter().map(|profile| profile[at]).sum());
         let best = (0..DELAYS).min_by(|&a, &b| sum[a].total_cmp(&sum[b]))?;
         // slopes over ±3 steps smooth the rounding of single samples
@@ -187,7 +187,7 @@ impl ClockEstimator {
             return None;
         }
         let width = SPAN as f64 * STEP;
-        let slope = |x: &Profile| (x[best + SPAN] - x[best - SPAN]) / (2.0 * width);
+        let slope = |x: &LikelihoodProfile| (x[best + SPAN] - x[best - SPAN]) / (2.0 * width);
         let bend = (sum[best + SPAN] - 2.0 * sum[best] + sum[best - SPAN]) / (width * width);
         if bend <= 0.0 {
             return None;
@@ -239,7 +239,7 @@ impl ClockEstimator {
     }
 
     /// Onset at `onset_ns`; `None` if the samples around it do not show one.
-    fn onset(&self, onset_ns: i64) -> Option<Onset> {
+    fn onset(&self, onset_ns: i64) -> Option<OnsetWindow> {
         let around = self
             .held
             .iter()
@@ -265,11 +265,11 @@ impl ClockEstimator {
         let middle = samples[samples.len() / 2].centre;
         samples.iter_mut().for_each(|x| x.centre -= middle);
         let begun = force_begins(&samples)?;
-        Some(Onset { samples, begun })
+        Some(OnsetWindow { samples, begun })
     }
 }
 
-impl Onset {
+impl OnsetWindow {
     /// Samples around an instant; `None` if they do not cover it.
     fn around(&self, t: f64) -> Option<&[OnsetSample]> {
         let first = self.samples.partition_point(|x| x.t < t - BEFORE);
@@ -294,7 +294,7 @@ impl Onset {
 
     /// - `coarse`: delay in the middle of the profile, s.
     /// - `bend`: compliance of the stylus, m/N.
-    fn profile(&self, coarse: f64, bend: f64) -> Option<Profile> {
+    fn profile(&self, coarse: f64, bend: f64) -> Option<LikelihoodProfile> {
         let around = self.around(self.begun - coarse)?;
         let mut profile = [0.0; DELAYS];
         let (mut stop, mut least) = (0.0, f64::INFINITY);

@@ -68,13 +68,13 @@ pub struct MarkerFilter {
     params: MarkerParams,
     order: SyncParams,
     frames: Stream<MarkerFrame>,
-    tracked: Option<Tracked>,
+    tracked: Option<TrackedBody>,
     counts: MarkerCounts,
 }
 
 /// The body as of the last frame.
 #[derive(Clone, Copy, Debug)]
-struct Tracked {
+struct TrackedBody {
     stamp_ns: i64,
     /// last time at which its markers determined the pose
     held_ns: i64,
@@ -169,12 +169,12 @@ impl MarkerFilter {
         *count += 1;
     }
 
-    fn acquire(&mut self, frame: &MarkerFrame) -> Option<Tracked> {
+    fn acquire(&mut self, frame: &MarkerFrame) -> Option<TrackedBody> {
         let (pose_ot, matches) = self.body.acquire(frame.seen(), self.params.gate)?;
         self.counts.relabelled += matches.relabelled;
         self.counts.rejected += matches.rejected;
         let motion = BodyMotion::at_rest(&self.body, &pose_ot);
-        Some(Tracked {
+        Some(TrackedBody {
             stamp_ns: frame.stamp_ns,
             held_ns: frame.stamp_ns,
             motion,
@@ -183,7 +183,7 @@ impl MarkerFilter {
 
     /// Flies the body on to the frame and pulls it by its markers; `None` after too little hold for
     /// too long.
-    fn follow(&mut self, before: &Tracked, frame: &MarkerFrame) -> Option<Tracked> {
+    fn follow(&mut self, before: &TrackedBody, frame: &MarkerFrame) -> Option<TrackedBody> {
         if frame.stamp_ns.saturating_sub(before.held_ns) > self.params.coast_ns {
             return None;
         }
@@ -214,7 +214,7 @@ impl MarkerFilter {
         } else {
             before.held_ns
         };
-        Some(Tracked {
+        Some(TrackedBody {
             stamp_ns: frame.stamp_ns,
             held_ns,
             motion,
@@ -222,7 +222,7 @@ impl MarkerFilter {
     }
 
     /// Poses at the multiples of the period after one frame, up to the next.
-    fn give(&self, before: &Tracked, now: &Tracked, each: &mut impl FnMut(StampedPose)) {
+    fn give(&self, before: &TrackedBody, now: &TrackedBody, each: &mut impl FnMut(StampedPose)) {
         let period = self.params.period_ns;
         let [from, to] = [before, now].map(|tracked| tracked.motion.pose_ot(&self.body));
         let span = now.stamp_ns.saturating_sub(before.stamp_ns) as f64;

@@ -17,7 +17,7 @@ pub use motion::SpringParams;
 use nalgebra::Point3;
 
 use super::SettingError;
-use super::stream::Stamped;
+use super::stream::StampedMessage;
 use crate::parameters;
 
 /// Maximum number of markers of a body, and of a frame.
@@ -75,7 +75,7 @@ impl MarkerFrame {
     }
 }
 
-impl Stamped for MarkerFrame {
+impl StampedMessage for MarkerFrame {
     const IS_LOST_ALONE: bool = true;
 
     fn stamp_ns(&self) -> i64 {

@@ -9,7 +9,9 @@ use touchup_probing::arm::{
     ArmError, LimitError, OnsetVerdict, ProbeError, Safety, SlideEnding, StopRequest, TouchMoment,
     TouchOutcome, TouchRecord,
 };
-use touchup_probing::execute::{Cell, Ending, Flag, Plan, Probed, ProbedSlide, ProbedTouch};
+use touchup_probing::execute::{
+    Ending, Flag, FlagResult, Plan, ProbedSlide, ProbedTouch, RobotCell,
+};
 
 /// Message if there is no flagged feature to probe.
 pub const NOTHING_FLAGGED: &str = "nothing is flagged that was not probed already";
@@ -47,7 +49,7 @@ pub fn planned(target: &Flag, plan: &Plan) -> ProbeResult {
 }
 
 /// Result of the measurement.
-pub fn result_of(target: &Flag, probed: &Probed) -> ProbeResult {
+pub fn result_of(target: &Flag, probed: &FlagResult) -> ProbeResult {
     let feature = probed
         .found
         .as_ref()
@@ -158,9 +160,9 @@ pub fn summary_of(results: &[ProbeResult]) -> String {
 /// - `radius`: of the tip, m.
 pub fn touches_of(
     target: &Flag,
-    probed: &Probed,
+    probed: &FlagResult,
     radius: f64,
-    cell: &Cell,
+    cell: &RobotCell,
     offset_ns: i64,
     frame: &str,
 ) -> Vec<ProbeTouch> {
@@ -276,7 +278,12 @@ fn stopped(error: &ProbeError) -> u8 {
 }
 
 /// The touch, and the stamp for its header.
-fn touch_of(touch: &ProbedTouch, radius: f64, cell: &Cell, offset_ns: i64) -> (Time, ProbeTouch) {
+fn touch_of(
+    touch: &ProbedTouch,
+    radius: f64,
+    cell: &RobotCell,
+    offset_ns: i64,
+) -> (Time, ProbeTouch) {
     let approach = touch.planned.direction.into_inner();
     let mut made = ProbeTouch {
         verdict: ProbeTouch::HELD_BACK,

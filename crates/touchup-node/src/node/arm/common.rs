@@ -7,11 +7,11 @@ use crate::ros::locked;
 use crate::ros::messages::TriggerResponse;
 use crate::ros::stop::StopState;
 use touchup_probing::arm::{ArmError, ArmState, Safety};
-use touchup_probing::execute::Cell;
+use touchup_probing::execute::RobotCell;
 
-/// Readable and writable from any thread.
+/// State shared by the arm thread and the others.
 #[derive(Debug)]
-pub struct Common {
+pub struct SharedArmState {
     is_busy: AtomicBool,
     /// stop state
     pub stops: Arc<StopState>,
@@ -26,7 +26,7 @@ struct StateSeen {
     stop: Option<String>,
 }
 
-impl Common {
+impl SharedArmState {
     /// Before the first state.
     pub fn new(stops: Arc<StopState>) -> Self {
         Self {
@@ -110,7 +110,7 @@ impl Common {
     }
 
     /// `~/arm_state`
-    pub fn state(&self, cell: &Cell) -> TriggerResponse {
+    pub fn state(&self, cell: &RobotCell) -> TriggerResponse {
         let ready = self.ready();
         let work = if self.is_busy.load(Ordering::Acquire) {
             "it works at an order"

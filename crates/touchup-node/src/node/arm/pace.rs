@@ -9,14 +9,14 @@ use touchup_sim::SimArm;
 /// Delay after which the pace restarts instead of catching up.
 const LATE: Duration = Duration::from_millis(100);
 
-/// Returns states at their due times.
-pub struct Paced<'a> {
+/// A simulated arm that returns states at their due times.
+pub struct PacedArm<'a> {
     clock: Clock,
     arm: SimArm<'a>,
     due: Instant,
 }
 
-impl<'a> Paced<'a> {
+impl<'a> PacedArm<'a> {
     /// Starts now.
     pub fn new(clock: Clock, arm: SimArm<'a>) -> Self {
         Self {
@@ -27,7 +27,7 @@ impl<'a> Paced<'a> {
     }
 }
 
-impl Arm for Paced<'_> {
+impl Arm for PacedArm<'_> {
     fn next_state(&mut self) -> Result<ArmState, ArmError> {
         self.due += Duration::from_secs_f64(self.arm.period());
         let now = self.clock.now();
@@ -72,7 +72,7 @@ mod tests {
         let (plate, params) = (Plate::default(), ArmParams::default());
         let start = params.pose_bo * Isometry3::translation(30e-3, 25e-3, 52e-3);
         let arm = || SimArm::new(&plate, params.clone(), &start).unwrap();
-        let (mut paced, mut free) = (Paced::new(clock, arm()), arm());
+        let (mut paced, mut free) = (PacedArm::new(clock, arm()), arm());
         for order in 0..500 {
             // a lost order would leave the arm on another path
             let linear = Vector3::new(
@@ -103,7 +103,7 @@ mod tests {
         let (clock, hand) = Clock::lock_step();
         let (plate, params) = (Plate::default(), ArmParams::default());
         let start = params.pose_bo * Isometry3::translation(30e-3, 25e-3, 52e-3);
-        let mut paced = Paced::new(
+        let mut paced = PacedArm::new(
             clock.clone(),
             SimArm::new(&plate, params.clone(), &start).unwrap(),
         );

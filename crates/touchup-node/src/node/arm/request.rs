@@ -1,13 +1,13 @@
 //! Content of a request, within the configured limits.
 
 use crate::ros::messages::{ProbeResult, ProbeSettings};
-use touchup_features::features::Kind;
-use touchup_probing::arm::{CRAWL, Narrower};
+use touchup_features::features::FeatureKind;
+use touchup_probing::arm::{CRAWL, RequestLimits};
 use touchup_probing::execute::ProbeParams;
-use touchup_probing::plan::{Quantity, sigma_of};
+use touchup_probing::plan::{FeatureQuantity, sigma_of};
 
 /// Settings of a probing.
-pub struct Wanted {
+pub struct RequestSettings {
     /// configured parameters, narrowed
     pub params: ProbeParams,
     /// only plan
@@ -17,7 +17,7 @@ pub struct Wanted {
 /// Confidence of a tolerance without one.
 const CONFIDENCE: f64 = 0.95;
 
-impl Wanted {
+impl RequestSettings {
     /// Reads settings; 0 means as configured.
     ///
     /// # Errors
@@ -26,11 +26,11 @@ impl Wanted {
     pub fn of(
         settings: &ProbeSettings,
         configured: &ProbeParams,
-        kind: Option<Kind>,
+        kind: Option<FeatureKind>,
     ) -> Result<Self, (u8, String)> {
         let bad = |why: String| (ProbeResult::BAD_REQUEST, why);
         let some = |asked: f64| (asked != 0.0).then_some(asked);
-        let by = Narrower {
+        let by = RequestLimits {
             force: some(settings.max_force),
             search: some(settings.max_search_travel),
             time: some(settings.max_duration),
@@ -61,12 +61,12 @@ impl Wanted {
             }
         }
         params.pattern.quantity = match settings.quantity {
-            ProbeSettings::QUANTITY_ALL => Quantity::All,
-            ProbeSettings::QUANTITY_POSITION => Quantity::Position,
-            ProbeSettings::QUANTITY_AXIS => Quantity::Axis,
-            ProbeSettings::QUANTITY_DIAMETER => Quantity::Diameter,
-            ProbeSettings::QUANTITY_LENGTH => Quantity::Length,
-            ProbeSettings::QUANTITY_WIDTH => Quantity::Width,
+            ProbeSettings::QUANTITY_ALL => FeatureQuantity::All,
+            ProbeSettings::QUANTITY_POSITION => FeatureQuantity::Position,
+            ProbeSettings::QUANTITY_AXIS => FeatureQuantity::Axis,
+            ProbeSettings::QUANTITY_DIAMETER => FeatureQuantity::Diameter,
+            ProbeSettings::QUANTITY_LENGTH => FeatureQuantity::Length,
+            ProbeSettings::QUANTITY_WIDTH => FeatureQuantity::Width,
             other => {
                 return Err(bad(format!(
                     "touches cannot be chosen for quantity {other}"
@@ -74,7 +74,7 @@ impl Wanted {
             }
         };
         if !params.pattern.quantity.is_of(kind) {
-            let kind = kind.map_or("unknown region", Kind::name);
+            let kind = kind.map_or("unknown region", FeatureKind::name);
             return Err(bad(format!(
                 "a {kind} has no {}",
                 params.pattern.quantity.name()

@@ -12,9 +12,9 @@ use tracing::{info, warn};
 use super::answer::{
     planned as planned_result, refused, response_of, result_of, summary_of, touches_of,
 };
-use super::common::Common;
-use super::pace::Paced;
-use super::request::Wanted;
+use super::common::SharedArmState;
+use super::pace::PacedArm;
+use super::request::RequestSettings;
 use super::world::{ArmLink, ArmWorld, GoalWatcher, ask_mesh, is_cancelled};
 use crate::node::channels::{ArmMeasurement, FeatureInput};
 use crate::node::error::NodeError;
@@ -27,11 +27,13 @@ use crate::ros::messages::{
 };
 use crate::ros::port::{ArmOrder, Goal, GoalEnd, Port, Publication, SamplePort};
 use crate::ros::refusal::not_probed;
-use crate::ros::stop::{Motion, StopState};
+use crate::ros::stop::{ArmMotion, StopState};
 use touchup_geometry::mesh::TriMesh;
 use touchup_io::probed_touches_file::append_probed_touches;
 use touchup_probing::arm::{Arm, StopRequest};
-use touchup_probing::execute::{Cell, Ending, Flag, ProbeParams, Prober, References, WayOut, plan};
+use touchup_probing::execute::{
+    Ending, Flag, ProbeParams, Prober, References, RobotCell, WayOut, plan,
+};
 use touchup_session::scene::simulated_arm;
 use touchup_sim::{MeshSurface, SimArm};
 
@@ -71,8 +73,8 @@ pub struct ArmOfNode {
 pub struct ArmHandle {
     inputs: SyncSender<FolderOrder>,
     /// state shared with the thread
-    pub common: Arc<Common>,
-    cell: Cell,
+    pub common: Arc<SharedArmState>,
+    cell: RobotCell,
 }
 
 impl Drop for ArmHandle {
@@ -115,7 +117,7 @@ struct ArmWorker {
     link: ArmLink,
     port: Arc<dyn Port>,
     features: SyncSender<FeatureInput>,
-    cell: Cell,
+    cell: RobotCell,
     params: ProbeParams,
     inputs: Receiver<FolderOrder>,
     /// the time of ROS at the last state, ns
@@ -139,7 +141,7 @@ pub fn start(
 ) -> Result<(ArmHandle, JoinHandle<()>), NodeError> {
     let (cell, params) = setup.scene.probing().ok_or(NodeError::NoRobot)?;
     let (to, inputs) = sync_channel(QUEUE);
-    let common = Arc::new(Common::new(Arc::clone(stops)));
+    let common = Arc::new(SharedArmState::new(Arc::clone(stops)));
     stops.look();
     let ends = EndsArm(Arc::clone(stops));
     let handle = ArmHandle {
@@ -206,7 +208,7 @@ impl ArmWorker {
             &self.cell.above(part),
         );
         let arm = arm.map_err(|error| format!("the simulated arm cannot begin: {error}"))?;
-        self.run(&mut Paced::new(self.link.setup.clock.clone(), arm));
+        self.run(&mut PacedArm::new(self.link.setup.clock.clone(), arm));
         Ok(())
     }
 
@@ -454,8 +456,12 @@ impl ArmWorker {
         Ok(targets)
     }
 
-    fn wanted(&self, settings: &ProbeSettings, target: &Flag) -> Result<Wanted, (u8, String)> {
-        let wanted = Wanted::of(settings, &self.params, target.kind)?;
+    fn wanted(
+        &self,
+        settings: &ProbeSettings,
+        target: &Flag,
+    ) -> Result<RequestSettings, (u8, String)> {
+        let wanted = RequestSettings::of(settings, &self.params, target.kind)?;
         if !wanted.is_dry_run {
             let scene_allows = self
                 .link
@@ -489,7 +495,7 @@ impl ArmWorker {
         &mut self,
         folder: &Path,
         target: &Flag,
-        wanted: &Wanted,
+        wanted: &RequestSettings,
         arm: &mut dyn Arm,
         watched: Option<GoalWatcher<'_>>,
         counts: [usize; 2],
@@ -548,7 +554,7 @@ impl ArmWorker {
             self.references = prober.take_references();
         }
         self.way_out = prober.into_way_out();
-        self.link.common.stops.enter(Motion::Rests);
+        self.link.common.stops.enter(ArmMotion::Rests);
         info!(feature = target.id, ending = %probed.ending, touches = probed.touches.len(), "probed");
         if let Ending::Stopped(_) = &probed.ending {
             self.link.common.stop(&probed.ending.to_string());

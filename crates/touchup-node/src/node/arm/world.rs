@@ -7,14 +7,14 @@ use std::time::{Duration, Instant};
 
 use nalgebra::Point3;
 
-use super::common::Common;
+use super::common::SharedArmState;
 use crate::node::setup::Setup;
 use crate::node::side_work::begin;
 use crate::ros::convert::{as_pose, as_wrench};
 use crate::ros::messages::ProbeFeedback;
 use crate::ros::parameters::CELL_FRAME;
 use crate::ros::port::{Feedback, SamplePort};
-use crate::ros::stop::Motion;
+use crate::ros::stop::ArmMotion;
 use touchup_geometry::mesh::{FaceHit, TriMesh};
 use touchup_probing::arm::{ArmState, Observer, StopRequest};
 use touchup_probing::execute::{Phase, Progress, StaticWorld, World};
@@ -54,7 +54,7 @@ pub struct ArmLink {
     pub setup: Arc<Setup>,
     /// port for the measurements of the arm
     pub samples: Box<dyn SamplePort>,
-    pub common: Arc<Common>,
+    pub common: Arc<SharedArmState>,
     /// offset from the arm's clock to ROS time, ns
     pub offset_ns: Option<i64>,
     /// start of the current order
@@ -208,9 +208,9 @@ impl World for ArmWorld<'_> {
     fn enter(&mut self, phase: Phase) {
         self.phase = phase;
         self.link.common.stops.enter(if phase == Phase::Retract {
-            Motion::Retracts
+            ArmMotion::Retracts
         } else {
-            Motion::Moves
+            ArmMotion::Moves
         });
         self.send_feedback();
     }

@@ -11,7 +11,7 @@ use tokio::sync::watch;
 use super::control::ReplayControl;
 use super::progress::ReplayNext;
 use super::recording::SessionRecording;
-use crate::node::{Node, Prepared, ReplayedSession};
+use crate::node::{Node, PreparedNode, ReplayedSession};
 use crate::page::annotations::Annotations;
 use crate::page::board::Board;
 use crate::page::calls::Calls;
@@ -137,7 +137,7 @@ impl Player {
         for (name, value) in parameters {
             all.set(name, &value).map_err(|error| error.to_string())?;
         }
-        let ready = Prepared::replayed(
+        let ready = PreparedNode::replayed(
             all,
             folder.clone(),
             ReplayedSession::new(recording, topics, changes),

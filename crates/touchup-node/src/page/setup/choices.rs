@@ -6,7 +6,7 @@ use super::beside::{beside, to_its_end};
 use super::facts::read_facts;
 use super::node_setup::NodeSetup;
 use super::scene_draft::StatedTip;
-use super::setup_shown::{ScanChoice, SetupStep, Stage};
+use super::setup_shown::{ScanChoice, SetupStage, SetupStep};
 use super::setup_state::{NO_SCAN, NO_TIP, NodeSetupError};
 use crate::ros::locked;
 use touchup_io::mesh_file::MeshUnit;
@@ -104,7 +104,7 @@ impl NodeSetup {
             .with(state.tip, Some((&facts.file, unit)))
             .map_err(NodeSetupError::refused)?;
         self.write_scene(&mut state, text)?;
-        (state.stage, state.failure) = (Stage::Starting, None);
+        (state.stage, state.failure) = (SetupStage::Starting, None);
         self.changed.notify_all();
         Ok(())
     }

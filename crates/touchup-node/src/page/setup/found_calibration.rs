@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::Serialize;
 
-use touchup_session::calibration::{Calibrated, PayloadFound, ScanFound, TipFound};
+use touchup_session::calibration::{CalibrationResult, PayloadFound, ScanFound, TipFound};
 use touchup_session::scene::{Scene, Setting};
 
 /// The result, as `touchup calibrate … --json` prints it.
@@ -26,7 +26,7 @@ impl fmt::Display for FoundCalibration {
     }
 }
 
-impl Calibrated for FoundCalibration {
+impl CalibrationResult for FoundCalibration {
     fn set_in(&self, scene: &mut Scene) -> (Vec<Setting>, String) {
         match self {
             Self::Tip(found) => found.set_in(scene),

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
 use super::scene_draft::SceneDraft;
-use super::setup_shown::{CalibrationChoice, SetupFailure, SetupShown, SetupStep, Stage};
+use super::setup_shown::{CalibrationChoice, SetupFailure, SetupShown, SetupStage, SetupStep};
 use super::setup_state::{NodeSetupError, SetupState};
 use crate::page::access::Role;
 use crate::page::error::WebError;
@@ -101,7 +101,7 @@ impl NodeSetup {
     /// Waits for the start by an operator: returns the scene, which names the scan and its unit.
     pub fn wait(&self) -> PathBuf {
         let mut state = locked(&self.state);
-        while state.stage != Stage::Starting {
+        while state.stage != SetupStage::Starting {
             state = self
                 .changed
                 .wait(state)
@@ -115,7 +115,7 @@ impl NodeSetup {
     /// - `step`: the remedy; `why`: in words.
     pub fn refuse(&self, step: SetupStep, why: String) {
         let mut state = locked(&self.state);
-        state.stage = Stage::Choosing;
+        state.stage = SetupStage::Choosing;
         state.failure = Some(SetupFailure { step, why });
     }
 

@@ -31,7 +31,7 @@ const LARGEST_REQUEST: usize = 16 << 10;
 
 /// State of the routes.
 #[derive(Clone)]
-struct Served {
+struct RouteState {
     entrance: Arc<Entrance>,
     setup: Arc<NodeSetup>,
 }
@@ -50,7 +50,7 @@ pub(in crate::page) fn router(entrance: &Arc<Entrance>, setup: &Arc<NodeSetup>) 
         .route("/api/setup/use", post(use_calibration))
         .route("/api/setup/check", post(check))
         .route("/api/setup/start", post(start))
-        .with_state(Served {
+        .with_state(RouteState {
             entrance: Arc::clone(entrance),
             setup: Arc::clone(setup),
         })
@@ -59,9 +59,9 @@ pub(in crate::page) fn router(entrance: &Arc<Entrance>, setup: &Arc<NodeSetup>) 
         .layer(checked)
 }
 
-type Answered = Result<Response, Box<Response>>;
+type RouteResult = Result<Response, Box<Response>>;
 
-impl Served {
+impl RouteState {
     /// Refuses viewers.
     fn operator(&self, headers: &HeaderMap) -> Result<(), Box<Response>> {
         match self.entrance.role_of(headers)? {
@@ -71,7 +71,7 @@ impl Served {
     }
 
     /// The present setup.
-    async fn answer(&self, role: Role) -> Answered {
+    async fn answer(&self, role: Role) -> RouteResult {
         let setup = Arc::clone(&self.setup);
         let shown = spawn_blocking(move || setup.shown(role))
             .await
@@ -104,7 +104,7 @@ impl Served {
         headers: &HeaderMap,
         body: Body,
         change: impl FnOnce(&Arc<NodeSetup>, T) -> Result<(), NodeSetupError> + Send + 'static,
-    ) -> Answered {
+    ) -> RouteResult {
         self.operator(headers)?;
         let bad = |status, why: String| Box::new(refusal(status, &why));
         let text = to_bytes(body, LARGEST_REQUEST).await;
@@ -123,11 +123,11 @@ impl Served {
     }
 }
 
-fn sent(answered: Answered) -> Response {
+fn sent(answered: RouteResult) -> Response {
     answered.unwrap_or_else(|refused| *refused)
 }
 
-async fn shown(State(served): State<Served>, headers: HeaderMap) -> Response {
+async fn shown(State(served): State<RouteState>, headers: HeaderMap) -> Response {
     match served.entrance.role_of(&headers) {
         Ok(role) => sent(served.answer(role).await),
         Err(refused) => *refused,
@@ -150,22 +150,22 @@ struct UnitRequest {
 #[serde(deny_unknown_fields)]
 struct StartRequest {}
 
-async fn choose_scan(State(served): State<Served>, headers: HeaderMap, body: Body) -> Response {
+async fn choose_scan(State(served): State<RouteState>, headers: HeaderMap, body: Body) -> Response {
     let change = |setup: &Arc<NodeSetup>, ScanRequest { file }| setup.choose_scan(&file);
     sent(served.change(&headers, body, change).await)
 }
 
-async fn choose_unit(State(served): State<Served>, headers: HeaderMap, body: Body) -> Response {
+async fn choose_unit(State(served): State<RouteState>, headers: HeaderMap, body: Body) -> Response {
     let change = |setup: &Arc<NodeSetup>, UnitRequest { unit }| setup.choose_unit(unit);
     sent(served.change(&headers, body, change).await)
 }
 
-async fn state_tip(State(served): State<Served>, headers: HeaderMap, body: Body) -> Response {
+async fn state_tip(State(served): State<RouteState>, headers: HeaderMap, body: Body) -> Response {
     let change = |setup: &Arc<NodeSetup>, tip: StatedTip| setup.state_tip(tip);
     sent(served.change(&headers, body, change).await)
 }
 
-async fn calibrate(State(served): State<Served>, headers: HeaderMap, body: Body) -> Response {
+async fn calibrate(State(served): State<RouteState>, headers: HeaderMap, body: Body) -> Response {
     let change = |setup: &Arc<NodeSetup>, request: CalibrateRequest| setup.calibrate(&request);
     sent(served.change(&headers, body, change).await)
 }
@@ -176,7 +176,11 @@ struct UseRequest {
     what: CalibrationKind,
 }
 
-async fn use_calibration(State(served): State<Served>, headers: HeaderMap, body: Body) -> Response {
+async fn use_calibration(
+    State(served): State<RouteState>,
+    headers: HeaderMap,
+    body: Body,
+) -> Response {
     let change = |setup: &Arc<NodeSetup>, UseRequest { what }| setup.use_calibration(what);
     sent(served.change(&headers, body, change).await)
 }
@@ -188,13 +192,13 @@ struct CheckRequest {
     recording: Option<String>,
 }
 
-async fn check(State(served): State<Served>, headers: HeaderMap, body: Body) -> Response {
+async fn check(State(served): State<RouteState>, headers: HeaderMap, body: Body) -> Response {
     let change =
         |setup: &Arc<NodeSetup>, CheckRequest { recording }| setup.check(recording.as_deref());
     sent(served.change(&headers, body, change).await)
 }
 
-async fn start(State(served): State<Served>, headers: HeaderMap, body: Body) -> Response {
+async fn start(State(served): State<RouteState>, headers: HeaderMap, body: Body) -> Response {
     let change = |setup: &Arc<NodeSetup>, StartRequest {}| setup.start();
     sent(served.change(&headers, body, change).await)
 }
@@ -207,7 +211,7 @@ struct UploadQuery {
 
 /// Receives and chooses a scan: the body is the file.
 async fn take_upload(
-    State(served): State<Served>,
+    State(served): State<RouteState>,
     Query(UploadQuery { name }): Query<UploadQuery>,
     headers: HeaderMap,
     body: Body,
@@ -227,7 +231,7 @@ async fn take_upload(
 /// Receives a recording or a table: the body is the file. Answers with its name, and chooses
 /// nothing.
 async fn take_file(
-    State(served): State<Served>,
+    State(served): State<RouteState>,
     Query(UploadQuery { name }): Query<UploadQuery>,
     headers: HeaderMap,
     body: Body,

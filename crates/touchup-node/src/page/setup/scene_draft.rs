@@ -6,7 +6,9 @@ use std::time::SystemTime;
 use serde::{Deserialize, Serialize};
 
 use touchup_io::mesh_file::MeshUnit;
-use touchup_session::calibration::{Calibrated, CalibrationKind, calibrated_on, calibrated_scene};
+use touchup_session::calibration::{
+    CalibrationKind, CalibrationResult, calibrated_on, calibrated_scene,
+};
 use touchup_session::scene::{Scene, SceneError, Setting};
 
 /// Coverage factor of uncertainties on the page: expanded, k = 2.
@@ -116,7 +118,11 @@ impl SceneDraft {
     ///
     /// # Errors
     /// [`SceneError`]
-    pub fn calibrated(&self, found: &impl Calibrated, now: SystemTime) -> Result<Self, SceneError> {
+    pub fn calibrated(
+        &self,
+        found: &impl CalibrationResult,
+        now: SystemTime,
+    ) -> Result<Self, SceneError> {
         Self::of(calibrated_scene(&self.text, found, now)?)
     }
 

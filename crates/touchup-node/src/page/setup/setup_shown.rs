@@ -24,9 +24,10 @@ pub enum SetupStep {
     Start,
 }
 
+/// Stage of the setup.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub(super) enum Stage {
+pub(super) enum SetupStage {
     /// operators choose
     Choosing,
     /// the node starts
@@ -103,7 +104,7 @@ pub(super) struct UploadShown {
 /// The setup for a page.
 #[derive(Debug, Serialize)]
 pub(super) struct SetupShown {
-    pub stage: Stage,
+    pub stage: SetupStage,
     pub role: Role,
     pub program: &'static str,
     /// name of the folder of scans

@@ -2,7 +2,7 @@
 
 use super::scene_draft::{SceneDraft, StatedTip};
 use super::setup_shown::{
-    CalibrationChoice, CheckChoice, ScanChoice, SetupFailure, SetupStep, Stage, UploadShown,
+    CalibrationChoice, CheckChoice, ScanChoice, SetupFailure, SetupStage, SetupStep, UploadShown,
 };
 use touchup_io::mesh_file::MeshUnit;
 
@@ -35,7 +35,7 @@ const CALIBRATING: NodeSetupError =
     NodeSetupError::NotNow("a calibration is being made: wait until it is");
 
 pub(super) struct SetupState {
-    pub stage: Stage,
+    pub stage: SetupStage,
     /// with the calibrations made until now
     pub draft: SceneDraft,
     /// last text of the scene's file; empty: none
@@ -54,7 +54,7 @@ pub(super) struct SetupState {
 impl SetupState {
     pub fn new(draft: SceneDraft, on_disk: String) -> Self {
         Self {
-            stage: Stage::Choosing,
+            stage: SetupStage::Choosing,
             draft,
             on_disk,
             scan: ScanChoice::None,
@@ -70,7 +70,7 @@ impl SetupState {
 
     /// Whether operators may choose.
     pub fn require_choosing(&self) -> Result<(), NodeSetupError> {
-        if self.stage == Stage::Choosing {
+        if self.stage == SetupStage::Choosing {
             Ok(())
         } else {
             Err(STARTING)

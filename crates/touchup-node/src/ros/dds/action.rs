@@ -18,12 +18,12 @@ use ros2_client::qos::{Durability, History};
 use ros2_client::{ActionServer, ActionTypeName, RmwRequestId, WriteError};
 
 use super::answers::Room;
-use super::back_end::{DdsBackEnd, During};
+use super::back_end::{DdsBackEnd, DdsErrorContext};
 use super::graph::mapping;
 use super::incoming::{Listener, drain};
 use super::services::{OTHER_MAPPING, SERVICE};
 use super::topics::dds_name;
-use crate::ros::exchange::{Exchange, RosError};
+use crate::ros::exchange::{PortState, RosError};
 use crate::ros::locked;
 use crate::ros::messages::{ProbeFeedback, ProbeGoal, ProbeResponse};
 use crate::ros::port::{ArmOrder, Call, Feedback, Goal, GoalEnd, Reply};
@@ -59,7 +59,7 @@ struct Goals {
 
 struct ProbeAction {
     server: ProbeServer,
-    exchange: Arc<Exchange>,
+    exchange: Arc<PortState>,
     room: Arc<Room>,
     goals: Mutex<Goals>,
 }

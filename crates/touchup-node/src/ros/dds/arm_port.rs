@@ -14,7 +14,7 @@ use ros2_client::dds::rustdds::{
 };
 use ros2_client::{Node, NodeOptions, Publisher, Subscription};
 
-use super::back_end::{During, join};
+use super::back_end::{DdsErrorContext, join};
 use super::topics::{BEST_EFFORT, URGENT, keep, make_topic};
 use crate::ros::arguments::NodeConfig;
 use crate::ros::exchange::RosError;

@@ -12,14 +12,14 @@ use super::graph::DdsGraph;
 use super::incoming::Listener;
 use super::sockets::{OpenSockets, guard};
 use crate::ros::arguments::NodeConfig;
-use crate::ros::exchange::{Exchange, RosError};
+use crate::ros::exchange::{PortState, RosError};
 
 /// Names the refused request to DDS.
-pub(super) trait During<T> {
+pub(super) trait DdsErrorContext<T> {
     fn during(self, call: &'static str) -> Result<T, RosError>;
 }
 
-impl<T, E: Debug> During<T> for Result<T, E> {
+impl<T, E: Debug> DdsErrorContext<T> for Result<T, E> {
     fn during(self, call: &'static str) -> Result<T, RosError> {
         self.map_err(|error| {
             let reason = format!("{error:?}");
@@ -45,7 +45,7 @@ pub(super) struct DdsBackEnd<'a> {
     pub node: Node,
     pub graph: Arc<Mutex<DdsGraph>>,
     pub begun: BegunNode,
-    pub exchange: Arc<Exchange>,
+    pub exchange: Arc<PortState>,
     pub room: Arc<Room>,
     /// names of the services up to now, absolute and remapped
     pub names: Vec<String>,

@@ -18,7 +18,7 @@ use super::keep_alive::{KeepAlive, LOOK_EVERY};
 use super::rematch::Rematch;
 use super::sockets::{OpenSockets, guard};
 use crate::ros::arguments::NodeConfig;
-use crate::ros::exchange::{Exchange, RosError};
+use crate::ros::exchange::{PortState, RosError};
 use crate::ros::locked;
 use crate::ros::port::Arrival;
 
@@ -47,7 +47,7 @@ pub(super) struct DdsGraph {
     /// `None` if its ports are not available
     keep_alive: Option<KeepAlive>,
     rematch: Rematch,
-    exchange: Arc<Exchange>,
+    exchange: Arc<PortState>,
     mapping: ServiceMapping,
     own: GUID,
     /// ROS name and type of our topics, by their name in DDS
@@ -78,7 +78,7 @@ impl DdsGraph {
     /// [`RosError`]: for this computer alone, a socket that does not close to others.
     pub fn new(
         context: &Context,
-        exchange: &Arc<Exchange>,
+        exchange: &Arc<PortState>,
         config: &NodeConfig,
     ) -> Result<Self, RosError> {
         let participant = context.domain_participant();

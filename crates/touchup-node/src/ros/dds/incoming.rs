@@ -10,7 +10,7 @@ use ros2_client::dds::rustdds::mio1::event::Source;
 use ros2_client::dds::rustdds::mio1::{Events, Interest, Poll, Token, Waker};
 use ros2_client::{Gid, ReadResult, Subscription};
 
-use crate::ros::exchange::{Exchange, RosError};
+use crate::ros::exchange::{PortState, RosError};
 use crate::ros::messages::RosMessage;
 use crate::ros::port::Arrival;
 
@@ -42,7 +42,7 @@ const WAKE: Token = Token(usize::MAX);
 pub(super) fn listen(
     mut listeners: Vec<Box<dyn Listener>>,
     look_every: Option<Duration>,
-    exchange: &Arc<Exchange>,
+    exchange: &Arc<PortState>,
 ) -> Result<(Arc<Waker>, JoinHandle<()>), RosError> {
     let mut poll = Poll::new()?;
     for (token, listener) in listeners.iter_mut().enumerate() {
@@ -96,7 +96,7 @@ pub(super) fn listen(
 /// Reads all waiting messages under this name; reports unreadable ones with a remark after the
 /// reason.
 pub(super) fn drain<T>(
-    (name, exchange, remark): (&'static str, &Arc<Exchange>, &str),
+    (name, exchange, remark): (&'static str, &Arc<PortState>, &str),
     mut receive: impl FnMut() -> ReadResult<Option<T>>,
     mut take: impl FnMut(T),
 ) {
@@ -144,8 +144,8 @@ impl LastNumbers {
 pub(super) struct HeardTopic<M: RosMessage> {
     pub name: &'static str,
     pub subscription: Subscription<M>,
-    pub exchange: Arc<Exchange>,
-    pub arrival: fn(&Exchange, M) -> Arrival,
+    pub exchange: Arc<PortState>,
+    pub arrival: fn(&PortState, M) -> Arrival,
 }
 
 impl<M: RosMessage> Listener for HeardTopic<M> {

@@ -35,7 +35,7 @@ use self::answers::Room;
 use self::back_end::{BegunNode, DdsBackEnd, join};
 use self::graph::{DdsGraph, mapping};
 use crate::ros::arguments::NodeConfig;
-use crate::ros::exchange::{self, Exchange, Joined, RosError};
+use crate::ros::exchange::{self, ConnectedPort, PortState, RosError};
 use crate::ros::inbox::Inbox;
 use crate::ros::locked;
 use crate::ros::parameter_services::{self, PublicParameters};
@@ -46,7 +46,7 @@ pub use arm_port::arm_port;
 pub use samples::samples;
 
 struct DdsConnection {
-    exchange: Arc<Exchange>,
+    exchange: Arc<PortState>,
     waker: Arc<rustdds::mio1::Waker>,
     threads: Vec<JoinHandle<()>>,
     /// its entities leave the graph on drop
@@ -90,7 +90,7 @@ impl Drop for DdsConnection {
 /// [`RosError`]: an invalid name, no network, no thread.
 #[expect(clippy::too_many_lines)]
 pub fn start(config: &NodeConfig, inbox: Inbox) -> Result<Arc<dyn Port>, RosError> {
-    let exchange = Exchange::new(config, inbox);
+    let exchange = PortState::new(config, inbox);
     // the library's parameter services know only one mapping, and no ranges
     let options = declare(
         NodeOptions::new().start_parameter_services(false),
@@ -148,7 +148,7 @@ pub fn start(config: &NodeConfig, inbox: Inbox) -> Result<Arc<dyn Port>, RosErro
         threads,
         node: Some(node),
     };
-    Ok(Arc::new(Joined {
+    Ok(Arc::new(ConnectedPort {
         exchange,
         _connection: connection,
     }))

@@ -11,7 +11,7 @@ use ros2_client::{Node, RosoutRaw};
 use tracing::Level;
 
 use crate::log_lines::listen;
-use crate::ros::exchange::{Exchange, RosError};
+use crate::ros::exchange::{PortState, RosError};
 use crate::ros::locked;
 
 /// Period of checks whether the port leaves.
@@ -20,7 +20,7 @@ const LOOK_EVERY: Duration = Duration::from_millis(100);
 /// Starts the thread that sends lines of the log, in the name of the node.
 pub(super) fn send(
     node: &Arc<Mutex<Node>>,
-    exchange: &Arc<Exchange>,
+    exchange: &Arc<PortState>,
 ) -> Result<JoinHandle<()>, RosError> {
     let (node, lines) = (node.clone(), listen());
     // name of a logger: `cell.touchup`

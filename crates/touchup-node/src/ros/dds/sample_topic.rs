@@ -11,12 +11,12 @@ use ros2_client::qos::QosProfile;
 use serde::Deserialize;
 use serde::de::{DeserializeSeed, Deserializer, Error};
 
-use super::back_end::{BegunNode, DdsBackEnd, During};
+use super::back_end::{BegunNode, DdsBackEnd, DdsErrorContext};
 use super::graph::DdsGraph;
 use super::incoming::{LastNumbers, Listener, drain};
 use super::topics::{profile, topic_of};
 use crate::ros::clock::RosClock;
-use crate::ros::exchange::{Exchange, RosError};
+use crate::ros::exchange::{PortState, RosError};
 use crate::ros::locked;
 use crate::ros::sample_source::SampleSource;
 use crate::ros::topics::{SubscribesSamples, Topic};
@@ -65,7 +65,7 @@ struct SampleTopic {
     seen: u64,
     node: BegunNode,
     graph: Arc<Mutex<DdsGraph>>,
-    exchange: Arc<Exchange>,
+    exchange: Arc<PortState>,
     /// index of its counter of lost messages
     counter: usize,
     numbers: LastNumbers,

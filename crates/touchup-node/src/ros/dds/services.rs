@@ -14,11 +14,11 @@ use ros2_client::{Publisher, ReadResult, ServiceMapping, ServiceTypeName, Subscr
 use serde::{Deserialize, Serialize};
 
 use super::answers::{Room, Shrinkable};
-use super::back_end::{DdsBackEnd, During};
+use super::back_end::{DdsBackEnd, DdsErrorContext};
 use super::graph::mapping;
 use super::incoming::{Listener, drain};
 use super::topics::dds_name;
-use crate::ros::exchange::{Exchange, RosError};
+use crate::ros::exchange::{PortState, RosError};
 use crate::ros::messages::*;
 use crate::ros::port::Reply;
 use crate::ros::services::Serves;
@@ -29,15 +29,15 @@ macro_rules! carried {
 include!(concat!(env!("OUT_DIR"), "/carried.rs"));
 
 /// One service: its name, and the action for a request.
-struct Service<Q: ros2_client::Message + 'static, A: ros2_client::Message + 'static> {
+struct DdsService<Q: ros2_client::Message + 'static, A: ros2_client::Message + 'static> {
     name: &'static str,
     server: Server<Q, A>,
-    exchange: Arc<Exchange>,
+    exchange: Arc<PortState>,
     room: Arc<Room>,
     call: Box<dyn FnMut(Q, Reply<A>) + Send>,
 }
 
-impl<Q, A> Listener for Service<Q, A>
+impl<Q, A> Listener for DdsService<Q, A>
 where
     Q: ros2_client::Message + Clone + Send + Sync + 'static,
     A: Shrinkable + Send + Sync + 'static,
@@ -91,7 +91,7 @@ where
         let server = Server::<S::Request, S::Response>::new(self, name, S::TYPE_NAME);
         let (server, exchange, room) = (server?, self.exchange.clone(), self.room.clone());
         self.names.push(self.config.resolve(name)?);
-        self.listeners.push(Box::new(Service {
+        self.listeners.push(Box::new(DdsService {
             name,
             server,
             exchange,
@@ -108,13 +108,13 @@ pub(super) const SERVICE: QosProfile =
 
 /// A request or an answer of rmw_cyclonedds: caller and number precede the message.
 #[derive(Clone, Serialize, Deserialize)]
-struct Headed<M> {
+struct ServiceEnvelope<M> {
     caller: u64,
     number: i64,
     message: M,
 }
 
-impl<M: ros2_client::Message> ros2_client::Message for Headed<M> {}
+impl<M: ros2_client::Message> ros2_client::Message for ServiceEnvelope<M> {}
 
 /// Sends the answer to one request.
 type SendAnswer<A> = Box<dyn FnOnce(A) -> Result<(), String> + Send>;
@@ -122,7 +122,10 @@ type SendAnswer<A> = Box<dyn FnOnce(A) -> Result<(), String> + Send>;
 /// Receives requests.
 enum Server<Q: ros2_client::Message + 'static, A: ros2_client::Message + 'static> {
     Enhanced(Arc<ros2_client::Server<Q, A>>),
-    Cyclone(Box<Subscription<Headed<Q>>>, Arc<Publisher<Headed<A>>>),
+    Cyclone(
+        Box<Subscription<ServiceEnvelope<Q>>>,
+        Arc<Publisher<ServiceEnvelope<A>>>,
+    ),
 }
 
 impl<Q, A> Server<Q, A>
@@ -183,7 +186,7 @@ where
             }),
             Self::Cyclone(requests, answers) => requests.take()?.map(
                 |(
-                    Headed {
+                    ServiceEnvelope {
                         caller,
                         number,
                         message,
@@ -193,7 +196,7 @@ where
                     let answers = answers.clone();
                     let send = move |message| {
                         answers
-                            .publish(Headed {
+                            .publish(ServiceEnvelope {
                                 caller,
                                 number,
                                 message,

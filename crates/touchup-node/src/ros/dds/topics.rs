@@ -6,13 +6,13 @@ use ros2_client::dds::rustdds::{self, QosPolicyBuilder, TopicDescription, TopicK
 use ros2_client::qos::{Durability, History, QosProfile, WhenFull};
 use ros2_client::{MessageTypeName, Name, Node, WriteError};
 
-use super::back_end::{DdsBackEnd, During};
+use super::back_end::{DdsBackEnd, DdsErrorContext};
 use super::incoming::HeardTopic;
-use crate::ros::exchange::{Exchange, RosError};
+use crate::ros::exchange::{PortState, RosError};
 use crate::ros::locked;
 use crate::ros::messages::RosMessage;
 use crate::ros::port::{Arrival, TILES_KEPT};
-use crate::ros::send_queue::Sent;
+use crate::ros::send_queue::SendOutcome;
 use crate::ros::topics::{
     MESH, MESH_PATCH, PROBE_TOUCHES, Publisher, Publishes, Subscribes, Topic,
 };
@@ -75,11 +75,11 @@ impl<M: RosMessage> Publishes<M> for DdsBackEnd<'_> {
         }
         drop(graph);
         Ok(Box::new(move |message| match publisher.publish(message) {
-            Ok(()) => Sent::Done,
-            Err(WriteError::WouldBlock { data }) => Sent::Later(data),
+            Ok(()) => SendOutcome::Done,
+            Err(WriteError::WouldBlock { data }) => SendOutcome::Later(data),
             Err(error) => {
                 tracing::warn!(topic_type = M::TYPE_NAME, %error, "a message is not sent");
-                Sent::Refused
+                SendOutcome::Refused
             }
         }))
     }
@@ -89,7 +89,7 @@ impl<M: RosMessage> Subscribes<M> for DdsBackEnd<'_> {
     fn subscribe(
         &mut self,
         topic: Topic,
-        arrival: fn(&Exchange, M) -> Arrival,
+        arrival: fn(&PortState, M) -> Arrival,
     ) -> Result<(), RosError> {
         let (profile, whole) = (profile(topic), self.config.resolve(topic.name)?);
         let announced = make_topic::<M>(&self.node, &whole, &profile)?;

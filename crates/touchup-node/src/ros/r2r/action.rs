@@ -6,10 +6,10 @@ use std::sync::{Arc, Mutex};
 use futures::{FutureExt, Stream, StreamExt};
 use r2r::{ActionServerCancelRequest, ActionServerGoal, ActionServerGoalRequest, Node};
 
-use super::back_end::{During, PollSource, source};
+use super::back_end::{PollSource, RclErrorContext, source};
 use super::convert::Convert;
 use super::touchup_msgs::action::Probe::Action;
-use crate::ros::exchange::{Exchange, RosError};
+use crate::ros::exchange::{PortState, RosError};
 use crate::ros::locked;
 use crate::ros::messages::{ProbeFeedback, ProbeGoal, ProbeResponse};
 use crate::ros::port::{ArmOrder, Call, Feedback, Goal, GoalEnd};
@@ -42,17 +42,17 @@ struct Cancels {
     requests: Box<dyn Stream<Item = ActionServerCancelRequest> + Send + Unpin>,
 }
 
-type Running = Arc<Mutex<Vec<Cancels>>>;
+type RunningGoals = Arc<Mutex<Vec<Cancels>>>;
 
 /// The server of the action: one source of goals, one of cancel requests.
 pub(super) fn server(
     node: &mut Node,
-    exchange: &Arc<Exchange>,
+    exchange: &Arc<PortState>,
 ) -> Result<[PollSource; 2], RosError> {
     let requests = node
         .create_action_server::<Action>(PROBE)
         .during("offering an action")?;
-    let running = Running::default();
+    let running = RunningGoals::default();
     let cancels = running.clone();
     let exchange = exchange.clone();
     let goals = source(requests, move |request: ActionServerGoalRequest<Action>| {
@@ -68,8 +68,8 @@ pub(super) fn server(
 /// Replies of the node, sent by the sending thread to keep their order.
 fn goal(
     request: ActionServerGoalRequest<Action>,
-    exchange: &Arc<Exchange>,
-    running: &Running,
+    exchange: &Arc<PortState>,
+    running: &RunningGoals,
 ) -> Goal {
     let is_cancelled = Arc::new(AtomicBool::new(false));
     let handle = Arc::new(GoalHandle {
@@ -96,7 +96,7 @@ fn goal(
     }
 }
 
-fn accept(handle: &Arc<GoalHandle>, is_accepted: bool, running: &Running) -> r2r::Result<()> {
+fn accept(handle: &Arc<GoalHandle>, is_accepted: bool, running: &RunningGoals) -> r2r::Result<()> {
     let GoalState::Asked(request) = handle.change(GoalState::Over) else {
         return Ok(());
     };

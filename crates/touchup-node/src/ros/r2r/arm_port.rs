@@ -11,7 +11,7 @@ use r2r::geometry_msgs::msg::WrenchStamped as TheirWrench;
 use r2r::sensor_msgs::msg::JointState as TheirJoints;
 use r2r::trajectory_msgs::msg::JointTrajectory as TheirOrder;
 
-use super::back_end::{During, source};
+use super::back_end::{RclErrorContext, source};
 use super::context;
 use super::convert::Convert;
 use super::topics::profile;

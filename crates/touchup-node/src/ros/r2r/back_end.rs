@@ -6,14 +6,14 @@ use futures::{FutureExt, Stream, StreamExt};
 
 use super::graph::R2rGraph;
 use crate::ros::arguments::NodeConfig;
-use crate::ros::exchange::{Exchange, RosError};
+use crate::ros::exchange::{PortState, RosError};
 
 /// Names the refused request to rcl.
-pub(super) trait During<T> {
+pub(super) trait RclErrorContext<T> {
     fn during(self, call: &'static str) -> Result<T, RosError>;
 }
 
-impl<T> During<T> for r2r::Result<T> {
+impl<T> RclErrorContext<T> for r2r::Result<T> {
     fn during(self, call: &'static str) -> Result<T, RosError> {
         let remedy = "is the workspace sourced that has touchup_msgs?";
         self.map_err(|error| RosError::Refused {
@@ -49,6 +49,6 @@ pub(super) struct R2rBackEnd<'a> {
     pub config: &'a NodeConfig,
     pub node: r2r::Node,
     pub graph: R2rGraph,
-    pub exchange: Arc<Exchange>,
+    pub exchange: Arc<PortState>,
     pub sources: Vec<PollSource>,
 }

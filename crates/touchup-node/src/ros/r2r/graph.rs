@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use r2r::qos::{DurabilityPolicy, QosProfile, ReliabilityPolicy};
 use r2r::{Context, Node, Publisher, WrappedTypesupport};
 
-use crate::ros::exchange::Exchange;
+use crate::ros::exchange::PortState;
 use crate::ros::port::Arrival;
 
 /// Period of the queries.
@@ -81,7 +81,7 @@ impl R2rGraph {
     }
 
     /// Reports changes, if a query is due; returns whether ROS is still present.
-    pub fn look(&mut self, node: &Node, exchange: &Exchange) -> bool {
+    pub fn look(&mut self, node: &Node, exchange: &PortState) -> bool {
         if self.looked.elapsed() < PERIOD {
             return true;
         }

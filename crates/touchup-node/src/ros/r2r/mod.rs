@@ -27,7 +27,7 @@ use stand_in::{std_srvs, touchup_msgs};
 
 use crate::ros::arguments::NodeConfig;
 use crate::ros::clock::time;
-use crate::ros::exchange::{self, Exchange, Joined, RosError};
+use crate::ros::exchange::{self, ConnectedPort, PortState, RosError};
 use crate::ros::inbox::Inbox;
 use crate::ros::locked;
 use crate::ros::messages::{Parameter, ParameterEvent};
@@ -36,13 +36,13 @@ use crate::ros::parameters::ParameterValue;
 use crate::ros::port::{Arrival, Port};
 use crate::ros::topics::{mesh, subscribe, urgent};
 pub use arm_port::arm_port;
-use back_end::{During, PollSource, R2rBackEnd};
+use back_end::{PollSource, R2rBackEnd, RclErrorContext};
 use convert::Convert;
 use graph::R2rGraph;
 pub use samples::samples;
 
 struct R2rConnection {
-    exchange: Arc<Exchange>,
+    exchange: Arc<PortState>,
     sending: Vec<JoinHandle<()>>,
     spinning: Option<JoinHandle<()>>,
 }
@@ -63,7 +63,7 @@ impl Drop for R2rConnection {
 /// # Errors
 /// [`RosError`]: an invalid name, ROS does not start, no thread.
 pub fn start(config: &NodeConfig, inbox: Inbox) -> Result<Arc<dyn Port>, RosError> {
-    let exchange = Exchange::new(config, inbox);
+    let exchange = PortState::new(config, inbox);
     let context = context()?;
     let node = r2r::Node::create(context.clone(), &config.place.node, &config.place.namespace);
     let (node, graph) = (node.during("making the node")?, R2rGraph::new(context));
@@ -99,7 +99,7 @@ pub fn start(config: &NodeConfig, inbox: Inbox) -> Result<Arc<dyn Port>, RosErro
     })?;
     connection.spinning = Some(spinning);
     connection.sending.extend(exchange.senders(urgent, mesh)?);
-    Ok(Arc::new(Joined {
+    Ok(Arc::new(ConnectedPort {
         exchange,
         _connection: connection,
     }))
@@ -109,7 +109,7 @@ pub fn start(config: &NodeConfig, inbox: Inbox) -> Result<Arc<dyn Port>, RosErro
 fn announce(
     node: &mut r2r::Node,
     name: String,
-    exchange: &Arc<Exchange>,
+    exchange: &Arc<PortState>,
 ) -> Result<impl Fn(&str, &ParameterValue) + Send + Sync + 'static, RosError> {
     let events = node.create_publisher(
         "/parameter_events",
@@ -171,7 +171,7 @@ fn spin(
     mut node: r2r::Node,
     mut sources: Vec<PollSource>,
     mut graph: R2rGraph,
-    exchange: &Exchange,
+    exchange: &PortState,
 ) {
     let _reports_end = ReportsEnd(exchange);
     let mut in_vain = 0;
@@ -195,7 +195,7 @@ fn spin(
 }
 
 /// Ends the node too, which then saves, once nothing can arrive any more.
-struct ReportsEnd<'a>(&'a Exchange);
+struct ReportsEnd<'a>(&'a PortState);
 
 impl Drop for ReportsEnd<'_> {
     fn drop(&mut self) {

@@ -2,7 +2,7 @@
 
 use r2r::{Publisher, WrappedTypesupport, geometry_msgs::msg as geometry};
 
-use super::back_end::During;
+use super::back_end::RclErrorContext;
 use super::context;
 use super::convert::Convert;
 use super::topics::profile;

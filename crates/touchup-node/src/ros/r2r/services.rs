@@ -3,7 +3,7 @@
 use r2r::ServiceRequest;
 use r2r::qos::QosProfile;
 
-use super::back_end::{During, R2rBackEnd, source};
+use super::back_end::{R2rBackEnd, RclErrorContext, source};
 use super::convert::{Convert, R2rService};
 use crate::ros::exchange::RosError;
 use crate::ros::port::Reply;

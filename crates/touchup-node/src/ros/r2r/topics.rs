@@ -3,13 +3,13 @@
 use r2r::WrappedTypesupport;
 use r2r::qos::QosProfile;
 
-use super::back_end::{During, R2rBackEnd, source};
+use super::back_end::{R2rBackEnd, RclErrorContext, source};
 use super::convert::Convert;
-use crate::ros::exchange::{Exchange, RosError};
+use crate::ros::exchange::{PortState, RosError};
 use crate::ros::messages::RosMessage;
 use crate::ros::port::Arrival;
 use crate::ros::sample_source::SampleSource;
-use crate::ros::send_queue::Sent;
+use crate::ros::send_queue::SendOutcome;
 use crate::ros::topics::{MESH, Publisher, Publishes, Subscribes, SubscribesSamples, Topic};
 
 pub(super) fn profile(topic: Topic) -> QosProfile {
@@ -42,10 +42,10 @@ where
         );
         Ok(Box::new(move |message| {
             match publisher.publish(&message.theirs()) {
-                Ok(()) => Sent::Done,
+                Ok(()) => SendOutcome::Done,
                 Err(error) => {
                     tracing::warn!(topic_type = M::TYPE_NAME, %error, "a message is not sent");
-                    Sent::Refused
+                    SendOutcome::Refused
                 }
             }
         }))
@@ -59,7 +59,7 @@ where
     fn subscribe(
         &mut self,
         topic: Topic,
-        arrival: fn(&Exchange, M) -> Arrival,
+        arrival: fn(&PortState, M) -> Arrival,
     ) -> Result<(), RosError> {
         let profile = profile(topic);
         let messages = self

@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 use super::error::{ChildError, failure};
 use super::library::Control;
 use super::shared::ChildShared;
-use crate::ur::protocol::{Action, Begin, ClientReport, Link, Order, UrState};
+use crate::ur::protocol::{Begin, ClientReport, Order, OrderAction, RtdeConnection, UrState};
 use touchup_session::clock::Clock;
 
 /// Time without an order after which the thread acts by itself.
@@ -54,7 +54,7 @@ const SAME_TOOL: f64 = 1e-6;
 
 /// The current motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Doing {
+enum MotionPhase {
     /// from the states, not assumed
     Resting,
     Moving,
@@ -76,7 +76,7 @@ struct ForceMode {
 /// Reason why a driver ends before its orders.
 #[derive(Debug)]
 pub enum DriverEnd {
-    Lost(Link),
+    Lost(RtdeConnection),
     NotReady(ChildError),
     BadTool(String),
 }
@@ -87,7 +87,7 @@ pub struct Driver<'a, C> {
     shared: &'a ChildShared,
     begin: &'a Begin,
     clock: Clock,
-    doing: Doing,
+    doing: MotionPhase,
     force_mode: Option<ForceMode>,
     ordered: Instant,
     fed: Instant,
@@ -98,7 +98,7 @@ impl<'a, C: Control> Driver<'a, C> {
     /// - `clock`: clock of all times and deadlines.
     pub fn new(control: &'a C, shared: &'a ChildShared, begin: &'a Begin, clock: Clock) -> Self {
         let now = clock.now();
-        let (doing, force_mode) = (Doing::Resting, None);
+        let (doing, force_mode) = (MotionPhase::Resting, None);
         Self {
             control,
             shared,
@@ -135,7 +135,7 @@ impl<'a, C: Control> Driver<'a, C> {
         if self.control.is_connected() {
             Ok(())
         } else {
-            Err(DriverEnd::Lost(Link::Control))
+            Err(DriverEnd::Lost(RtdeConnection::Control))
         }
     }
 
@@ -146,7 +146,7 @@ impl<'a, C: Control> Driver<'a, C> {
         };
         self.ordered = self.clock.now();
         match self.serve(&order.what) {
-            Ok(()) if order.what == Action::Zero => self.shared.report(&ClientReport::Done {
+            Ok(()) if order.what == OrderAction::Zero => self.shared.report(&ClientReport::Done {
                 number: order.number,
             }),
             Ok(()) => {}
@@ -156,23 +156,23 @@ impl<'a, C: Control> Driver<'a, C> {
         Ok(())
     }
 
-    fn serve(&mut self, what: &Action) -> Result<(), ChildError> {
+    fn serve(&mut self, what: &OrderAction) -> Result<(), ChildError> {
         match *what {
             // a stopped motion does not restart, whoever resumes the program
-            Action::Move { .. } | Action::Press { .. }
+            OrderAction::Move { .. } | OrderAction::Press { .. }
                 if self.shared.has_halted.load(Ordering::Acquire) =>
             {
                 self.brake(BRAKE)
             }
-            Action::Move {
+            OrderAction::Move {
                 twist,
                 acceleration,
             } => {
-                self.doing = Doing::Moving;
+                self.doing = MotionPhase::Moving;
                 self.end_press()?;
                 self.control.speed(twist, acceleration)
             }
-            Action::Press {
+            OrderAction::Press {
                 frame,
                 force_n,
                 speed,
@@ -185,7 +185,7 @@ impl<'a, C: Control> Driver<'a, C> {
                     force: force_n,
                     speed,
                 });
-                self.doing = Doing::Moving;
+                self.doing = MotionPhase::Moving;
                 if self.force_mode != force_mode || self.clock.since(self.pressed) > REPEAT {
                     let [far, turned] = ASIDE;
                     self.force_mode = force_mode;
@@ -200,8 +200,8 @@ impl<'a, C: Control> Driver<'a, C> {
                 }
                 self.control.speed([x, y, z, 0.0, 0.0, 0.0], acceleration)
             }
-            Action::Stop { deceleration } => self.brake(deceleration),
-            Action::Zero => {
+            OrderAction::Stop { deceleration } => self.brake(deceleration),
+            OrderAction::Zero => {
                 self.rest()?;
                 self.control.zero()
             }
@@ -214,7 +214,7 @@ impl<'a, C: Control> Driver<'a, C> {
         while !self.control.is_running() && self.clock.since(begun) < UPLOAD {
             self.control.wait(&self.clock, TURN);
         }
-        self.doing = Doing::Resting;
+        self.doing = MotionPhase::Resting;
         let found = self.set_up().map_err(DriverEnd::NotReady)?;
         let tool = &self.begin.tool;
         if found
@@ -252,11 +252,11 @@ impl<'a, C: Control> Driver<'a, C> {
     /// The action without an order.
     fn look_after(&mut self) -> Result<(), ChildError> {
         match self.doing {
-            Doing::Resting if self.clock.since(self.fed) >= FEED => self.feed(),
-            Doing::Resting => Ok(()),
-            Doing::Braking { deceleration, .. } => self.brake(deceleration),
-            Doing::Moving if self.clock.since(self.ordered) > FRESH => self.brake(BRAKE),
-            Doing::Moving => Ok(()),
+            MotionPhase::Resting if self.clock.since(self.fed) >= FEED => self.feed(),
+            MotionPhase::Resting => Ok(()),
+            MotionPhase::Braking { deceleration, .. } => self.brake(deceleration),
+            MotionPhase::Moving if self.clock.since(self.ordered) > FRESH => self.brake(BRAKE),
+            MotionPhase::Moving => Ok(()),
         }
     }
 
@@ -283,16 +283,16 @@ impl<'a, C: Control> Driver<'a, C> {
     /// One turn of braking: the velocity goes to zero with the deceleration, then a hard stop takes
     /// the remainder. At rest it feeds the watchdog.
     fn brake(&mut self, deceleration: f64) -> Result<(), ChildError> {
-        if self.doing == Doing::Resting && self.force_mode.is_none() {
+        if self.doing == MotionPhase::Resting && self.force_mode.is_none() {
             return self.feed();
         }
-        let since = if let Doing::Braking { since, .. } = self.doing {
+        let since = if let MotionPhase::Braking { since, .. } = self.doing {
             since
         } else {
             self.clock.now()
         };
         // before any call: after a failed call it still brakes
-        self.doing = Doing::Braking {
+        self.doing = MotionPhase::Braking {
             deceleration,
             since,
         };
@@ -300,7 +300,7 @@ impl<'a, C: Control> Driver<'a, C> {
         // a paused program receives nothing; braking starts as soon as it resumes
         if state.is_some_and(|state| !state.is_playing()) {
             // after resumption the first states show an arm that does not move yet
-            self.doing = Doing::Braking {
+            self.doing = MotionPhase::Braking {
                 deceleration,
                 since: self.clock.now(),
             };
@@ -312,7 +312,7 @@ impl<'a, C: Control> Driver<'a, C> {
         // the first states may still show an arm that has not begun to move
         if is_at_rest && self.clock.since(since) > REST_TIME {
             self.control.hard_stop(HARD)?;
-            self.doing = Doing::Resting;
+            self.doing = MotionPhase::Resting;
         }
         Ok(())
     }
@@ -330,11 +330,11 @@ impl<'a, C: Control> Driver<'a, C> {
     /// Brakes until the arm is at rest.
     fn rest(&mut self) -> Result<(), ChildError> {
         let begun = self.clock.now();
-        while self.doing != Doing::Resting && self.clock.since(begun) < UPLOAD {
+        while self.doing != MotionPhase::Resting && self.clock.since(begun) < UPLOAD {
             self.brake(BRAKE)?;
             self.control.wait(&self.clock, TURN);
         }
-        if self.doing == Doing::Resting {
+        if self.doing == MotionPhase::Resting {
             Ok(())
         } else {
             Err(ChildError::Moves { after: UPLOAD })
@@ -345,8 +345,8 @@ impl<'a, C: Control> Driver<'a, C> {
     /// the arm may still execute the previous order, so it brakes until the states show rest.
     fn failed(&mut self, error: &ChildError) -> Result<(), DriverEnd> {
         let begun = self.clock.now();
-        if self.doing == Doing::Moving {
-            self.doing = Doing::Braking {
+        if self.doing == MotionPhase::Moving {
+            self.doing = MotionPhase::Braking {
                 deceleration: BRAKE,
                 since: begun,
             };
@@ -376,7 +376,7 @@ impl<'a, C: Control> Driver<'a, C> {
 
 /// The last waiting order, or the first `Zero` among them.
 fn newest(mut order: Order, orders: &Receiver<Order>) -> Order {
-    while order.what != Action::Zero {
+    while order.what != OrderAction::Zero {
         match orders.try_recv() {
             Ok(next) => order = next,
             Err(_) => break,

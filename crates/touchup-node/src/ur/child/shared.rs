@@ -6,11 +6,11 @@ use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 use super::library::leave;
-use crate::ur::protocol::{ClientReport, Link, UrState};
+use crate::ur::protocol::{ClientReport, RtdeConnection, UrState};
 
 /// The newest state and its arrival.
 #[derive(Clone, Copy, Debug)]
-pub struct Latest {
+pub struct ReceivedState {
     pub state: UrState,
     pub at: Instant,
 }
@@ -20,7 +20,7 @@ pub struct ChildShared {
     reports: Box<dyn Fn(&ClientReport) + Send + Sync>,
     /// number of the last order whose calls have returned
     pub served: AtomicU64,
-    pub latest: Mutex<Option<Latest>>,
+    pub latest: Mutex<Option<ReceivedState>>,
     /// the arm takes commands
     pub is_ready: AtomicBool,
     /// a state since then shows a stop of the arm or its program
@@ -59,20 +59,21 @@ impl ChildShared {
         }
     }
 
-    pub fn latest(&self) -> Option<Latest> {
+    pub fn latest(&self) -> Option<ReceivedState> {
         *self.latest.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Stores a new state.
     pub fn see(&self, state: UrState, at: Instant) {
-        *self.latest.lock().unwrap_or_else(PoisonError::into_inner) = Some(Latest { state, at });
+        *self.latest.lock().unwrap_or_else(PoisonError::into_inner) =
+            Some(ReceivedState { state, at });
         if self.is_ready.load(Ordering::Acquire) && !state.may_move() {
             self.has_halted.store(true, Ordering::Release);
         }
     }
 
     /// Reports a lost connection, and ends the process.
-    pub fn lost(&self, which: Link) -> ! {
+    pub fn lost(&self, which: RtdeConnection) -> ! {
         self.report(&ClientReport::Lost { which });
         leave(3)
     }

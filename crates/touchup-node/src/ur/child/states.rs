@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use super::library::Receive;
 use super::shared::ChildShared;
-use crate::ur::protocol::{ClientReport, Link, UrState};
+use crate::ur::protocol::{ClientReport, RtdeConnection, UrState};
 use touchup_session::clock::{Clock, ManualClock};
 
 /// Polling period: a fifth of the time between two states.
@@ -30,7 +30,7 @@ pub fn hand_on(
     };
     loop {
         if !receive.is_connected() {
-            shared.lost(Link::States);
+            shared.lost(RtdeConnection::States);
         }
         let state = receive
             .stamp()

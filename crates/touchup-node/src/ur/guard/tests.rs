@@ -57,7 +57,7 @@ fn state(program: ProgramState, safety_bits: u32, served: u64) -> ClientReport {
     }))
 }
 
-const UP: Action = Action::Move {
+const UP: OrderAction = OrderAction::Move {
     twist: [0.0, 0.0, 20e-3, 0.0, 0.0, 0.0],
     acceleration: 1.0,
 };
@@ -117,7 +117,7 @@ fn a_call_that_does_not_return_for_more_than_120_ms_is_a_hanging_client() {
     bench.hand.advance(5_000 * MS);
     assert_eq!(bench.take(state(Playing, 1, 2)), None);
     // zeroing has three seconds, and the next order 120 ms again
-    assert_eq!(bench.known.send(&Action::Zero, bench.clock.now()), 3);
+    assert_eq!(bench.known.send(&OrderAction::Zero, bench.clock.now()), 3);
     assert_eq!(
         bench.until_broken(&state(Playing, 1, 2)),
         (3_001, hangs(3_001))
@@ -426,7 +426,7 @@ fn an_arm_that_does_not_do_what_it_is_ordered_to_is_stopped_by_the_dashboard() {
         watch.hand.advance(2 * MS);
         watch.say(moving(20e-3, number));
     }
-    let stop = Action::Stop { deceleration: 1.0 };
+    let stop = OrderAction::Stop { deceleration: 1.0 };
     let mut after = 0;
     while !watch.guard.is_finished() && after < 1000 {
         let number = watch.shared.known().send(&stop, watch.shared.clock.now());

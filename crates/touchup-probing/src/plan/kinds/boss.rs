@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 use super::cylinder_fit::{FIRST, MOST_FIRST, RoundWall, surface_about};
 use super::hole::numbers;
 use crate::plan::error::ExploreError;
-use crate::plan::pattern::{Stage, Touched};
+use crate::plan::pattern::{PatternStep, TouchPattern};
 use crate::plan::search::{DEEPEST, ROUGH};
 use crate::plan::search_context::{AROUND, RING, SearchContext, TouchPlan, TouchResult};
 use crate::plan::slide::Slide;
@@ -71,7 +71,7 @@ impl BossPattern {
         context.above_ground("boss", self.ground_z, OFF_GROUND)
     }
 
-    fn take_top(&mut self, context: &mut SearchContext, touch: &Touched) {
+    fn take_top(&mut self, context: &mut SearchContext, touch: &PatternStep) {
         self.seen.extend(touch.observation);
         self.around += 1;
         if self.around <= RING {
@@ -95,7 +95,7 @@ impl BossPattern {
         self.phase = BossPhase::Out(context.params.flag_radius + context.params.ball_radius);
     }
 
-    fn take_out(&mut self, context: &SearchContext, touch: &Touched, distance: f64) {
+    fn take_out(&mut self, context: &SearchContext, touch: &PatternStep, distance: f64) {
         let ball = context.params.ball_radius;
         let lowest = context.height - DEEPEST * ball;
         let z = touch.place.map_or(lowest, |place| context.below(&place));
@@ -107,7 +107,7 @@ impl BossPattern {
         }
     }
 
-    fn take_in(&mut self, context: &SearchContext, touch: &Touched, distance: f64) {
+    fn take_in(&mut self, context: &SearchContext, touch: &PatternStep, distance: f64) {
         let before = self.wall.measuring.observations.len();
         self.wall.measuring.take(touch);
         if self.wall.measuring.observations.len() == before && touch.result == TouchResult::Unclear
@@ -129,7 +129,7 @@ impl BossPattern {
     }
 }
 
-impl Stage for BossPattern {
+impl TouchPattern for BossPattern {
     fn next(&mut self, context: &mut SearchContext) -> Result<Option<TouchPlan>, ExploreError> {
         let (ball, clearance) = (context.params.ball_radius, context.params.clearance);
         let (middle, outward) = (self.wall.middle, RoundWall::first_direction(self.direction));
@@ -160,7 +160,7 @@ impl Stage for BossPattern {
         }))
     }
 
-    fn take(&mut self, context: &mut SearchContext, touch: &Touched) {
+    fn take(&mut self, context: &mut SearchContext, touch: &PatternStep) {
         match self.phase {
             BossPhase::Top => self.take_top(context, touch),
             BossPhase::Out(distance) => self.take_out(context, touch, distance),

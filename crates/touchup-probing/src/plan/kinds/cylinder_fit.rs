@@ -4,14 +4,14 @@ use std::f64::consts::{SQRT_2, TAU};
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
-use crate::plan::design::{Asked, Knowledge};
+use crate::plan::design::{Knowledge, TargetUncertainties};
 use crate::plan::error::ExploreError;
-use crate::plan::measuring::{Measuring, Possible, Wanted};
-use crate::plan::pattern::Touched;
-use crate::plan::search_context::{OpenNumbers, Quantity, SearchContext, TouchPlan, toward};
+use crate::plan::measuring::{CandidateTouch, Measuring, SurfaceRequest};
+use crate::plan::pattern::PatternStep;
+use crate::plan::search_context::{FeatureQuantity, OpenNumbers, SearchContext, TouchPlan, toward};
 use crate::plan::slide::{RimStation, Slide};
 use touchup_features::features::fit::{
-    Cylinder, Fit, FitError, FitParams, Freedom, Observation, Plane, Surface, fit,
+    Cylinder, Fit, FitError, FitParams, Freedom, Observation, Plane, SurfaceModel, fit,
 };
 use touchup_geometry::numeric::{NormalEquations, mean};
 
@@ -61,7 +61,7 @@ impl RoundWall {
     }
 
     /// Takes a touch of the wall.
-    pub fn take(&mut self, context: &SearchContext, touch: &Touched) {
+    pub fn take(&mut self, context: &SearchContext, touch: &PatternStep) {
         self.measuring.take(touch);
         self.recentre(context);
     }
@@ -104,9 +104,9 @@ impl RoundWall {
         }
     }
 
-    fn wanted(&self, context: &SearchContext, guess: &Cylinder) -> Wanted {
+    fn wanted(&self, context: &SearchContext, guess: &Cylinder) -> SurfaceRequest {
         let sigma = context.params.sigma;
-        let asked = Asked::default();
+        let asked = TargetUncertainties::default();
         let (lean, fit) = squareness(
             context.square(context.lean),
             guess,
@@ -126,14 +126,14 @@ impl RoundWall {
                     asked.and(&[(Freedom::Size, 2.0)], sigma)
                 })
             }
-            Quantity::Position => asked.each(&[Freedom::X, Freedom::Y], sigma),
-            Quantity::Axis => asked.each(&[Freedom::TiltX, Freedom::TiltY], sigma),
-            Quantity::Diameter => asked.and(&[(Freedom::Size, 2.0)], sigma),
-            Quantity::All | Quantity::Length | Quantity::Width => asked
+            FeatureQuantity::Position => asked.each(&[Freedom::X, Freedom::Y], sigma),
+            FeatureQuantity::Axis => asked.each(&[Freedom::TiltX, Freedom::TiltY], sigma),
+            FeatureQuantity::Diameter => asked.and(&[(Freedom::Size, 2.0)], sigma),
+            FeatureQuantity::All | FeatureQuantity::Length | FeatureQuantity::Width => asked
                 .each(&[Freedom::X, Freedom::Y], sigma)
                 .and(&[(Freedom::Size, 2.0)], sigma),
         };
-        Wanted {
+        SurfaceRequest {
             before: Knowledge::before::<Cylinder>(
                 guess.radius.max(context.params.ball_radius),
                 lean,
@@ -179,7 +179,7 @@ impl RoundWall {
                 context.sideways(&(middle + direction * from), depth, &into, travel + REACH);
             let point = surface.pose_of
                 * (Point3::origin() + direction * surface.radius - Vector3::z() * depth);
-            Possible {
+            CandidateTouch {
                 point,
                 travel,
                 planned,
@@ -256,7 +256,7 @@ impl SearchContext {
 ///
 /// - `known`: prior for walls perpendicular to their surface, rad; `leans`: freedoms that may show
 ///   a lean.
-pub(in crate::plan) fn squareness<M: Surface>(
+pub(in crate::plan) fn squareness<M: SurfaceModel>(
     known: f64,
     guess: &M,
     touches: &[Observation],

@@ -5,8 +5,8 @@ use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
 
 use super::hole::numbers;
 use crate::plan::error::ExploreError;
-use crate::plan::measuring::{Measuring, Possible, Wanted};
-use crate::plan::pattern::{Stage, Touched};
+use crate::plan::measuring::{CandidateTouch, Measuring, SurfaceRequest};
+use crate::plan::pattern::{PatternStep, TouchPattern};
 use crate::plan::search::ROUGH;
 use crate::plan::search_context::{PatternParams, RING, SearchContext, TouchPlan, TouchResult};
 use crate::plan::slide::{RimStation, Slide};
@@ -99,7 +99,7 @@ impl EdgePattern {
     }
 
     /// Records a touch from above, also a miss.
-    fn record(&mut self, context: &SearchContext, touch: &Touched) {
+    fn record(&mut self, context: &SearchContext, touch: &PatternStep) {
         // end of the search
         let lowest = || context.in_f(&touch.planned.end());
         if touch.result != TouchResult::Unclear {
@@ -145,7 +145,7 @@ impl EdgePattern {
         has_both
     }
 
-    fn take_ring(&mut self, context: &mut SearchContext, touch: &Touched) {
+    fn take_ring(&mut self, context: &mut SearchContext, touch: &PatternStep) {
         self.record(context, touch);
         if self.tried > RING {
             self.tried = 0;
@@ -158,7 +158,7 @@ impl EdgePattern {
     }
 
     /// Takes more on the high side: too few of the ring may lie on it to determine its normal.
-    fn take_top(&mut self, context: &mut SearchContext, touch: &Touched) {
+    fn take_top(&mut self, context: &mut SearchContext, touch: &PatternStep) {
         self.record(context, touch);
         if self.tried < MORE.len() {
             return;
@@ -191,7 +191,7 @@ impl EdgePattern {
 
     /// A ball on the rim is less than its radius beyond the edge; farther out by more is the
     /// ground.
-    fn take_ground(&mut self, context: &SearchContext, touch: &Touched) {
+    fn take_ground(&mut self, context: &SearchContext, touch: &PatternStep) {
         if touch.result != TouchResult::Unclear {
             self.ground_z = context.below(
                 &touch
@@ -238,9 +238,9 @@ impl EdgePattern {
     }
 
     /// Request for the top, with y along the edge, or for the side, with x along it.
-    fn wanted(params: &PatternParams, lean: Freedom) -> Wanted {
+    fn wanted(params: &PatternParams, lean: Freedom) -> SurfaceRequest {
         // within the reach of its touches
-        Wanted::of_plane(params, &[lean], REACH * params.flag_radius, LEAN, 0)
+        SurfaceRequest::of_plane(params, &[lean], REACH * params.flag_radius, LEAN, 0)
     }
 
     fn places(params: &PatternParams) -> impl Iterator<Item = f64> + '_ {
@@ -248,7 +248,7 @@ impl EdgePattern {
             .map(|at| (at as f64 / (ALONG - 1) as f64 * 2.0 - 1.0) * REACH * params.flag_radius)
     }
 
-    fn possible_top(&self, context: &SearchContext, top: &Plane) -> Vec<Possible> {
+    fn possible_top(&self, context: &SearchContext, top: &Plane) -> Vec<CandidateTouch> {
         let PatternParams {
             ball_radius,
             clearance,
@@ -257,7 +257,7 @@ impl EdgePattern {
         let at = |along: f64, back: f64| {
             let point = top.pose_of * Point3::new(-back * ball_radius, along, 0.0);
             let planned = context.down(&context.in_f(&point), clearance + ball_radius + ROUGH);
-            Possible {
+            CandidateTouch {
                 point,
                 travel: clearance,
                 planned,
@@ -268,7 +268,12 @@ impl EdgePattern {
         )
     }
 
-    fn possible_side(&self, context: &SearchContext, side: &Plane, deep: f64) -> Vec<Possible> {
+    fn possible_side(
+        &self,
+        context: &SearchContext,
+        side: &Plane,
+        deep: f64,
+    ) -> Vec<CandidateTouch> {
         let PatternParams {
             ball_radius,
             clearance,
@@ -278,7 +283,7 @@ impl EdgePattern {
             let point = side.pose_of * Point3::new(along, 0.0, 0.0) - context.out() * depth;
             let from = context.in_f(&(point + side.normal() * (ball_radius + clearance)));
             let direction = context.pose_of.inverse_transform_vector(&-side.normal());
-            Possible {
+            CandidateTouch {
                 point,
                 travel: clearance,
                 planned: context.sideways(&from, depth, &direction, 2.0 * clearance),
@@ -301,7 +306,8 @@ impl EdgePattern {
         let of_side = self
             .side
             .best(&side, &of_side, self.possible_side(context, &side, deep));
-        let gain = |best: &Option<(Possible, f64)>| best.as_ref().map_or(0.0, |(_, gain)| *gain);
+        let gain =
+            |best: &Option<(CandidateTouch, f64)>| best.as_ref().map_or(0.0, |(_, gain)| *gain);
         self.is_top_next = gain(&of_top) >= gain(&of_side);
         let (chosen, measuring) = if self.is_top_next {
             (of_top, &mut self.top)
@@ -312,7 +318,7 @@ impl EdgePattern {
     }
 }
 
-impl Stage for EdgePattern {
+impl TouchPattern for EdgePattern {
     fn next(&mut self, context: &mut SearchContext) -> Result<Option<TouchPlan>, ExploreError> {
         let PatternParams {
             ball_radius: ball,
@@ -372,7 +378,7 @@ impl Stage for EdgePattern {
         }))
     }
 
-    fn take(&mut self, context: &mut SearchContext, touch: &Touched) {
+    fn take(&mut self, context: &mut SearchContext, touch: &PatternStep) {
         match self.phase {
             EdgePhase::Ring | EdgePhase::NoEdge => self.take_ring(context, touch),
             EdgePhase::Top => self.take_top(context, touch),

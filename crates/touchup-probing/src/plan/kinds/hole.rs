@@ -11,7 +11,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::cylinder_fit::{FIRST, MOST_FIRST, RoundWall, surface_about};
 use crate::plan::error::ExploreError;
-use crate::plan::pattern::{Stage, Touched};
+use crate::plan::pattern::{PatternStep, TouchPattern};
 use crate::plan::search::{BELOW_RIM, BESIDE, CHAMFER, OpeningSearch, REACH, ROUGH, SHALLOW};
 use crate::plan::search_context::{AROUND, PatternParams, SearchContext, TouchPlan, TouchResult};
 use crate::plan::slide::Slide;
@@ -50,7 +50,7 @@ impl HolePattern {
         }
     }
 
-    fn take_first(&mut self, context: &SearchContext, touch: &Touched) {
+    fn take_first(&mut self, context: &SearchContext, touch: &PatternStep) {
         if self.wall.measuring.observations.is_empty() && touch.result == TouchResult::Unclear {
             self.opening.slid_in(self.wall.middle, context);
             self.phase = HolePhase::Opening;
@@ -67,7 +67,7 @@ impl HolePattern {
         }
     }
 
-    fn take_around(&mut self, context: &mut SearchContext, touch: &Touched) {
+    fn take_around(&mut self, context: &mut SearchContext, touch: &PatternStep) {
         self.opening.top.extend(touch.observation);
         self.around += 1;
         if self.around >= AROUND {
@@ -80,7 +80,7 @@ impl HolePattern {
     }
 }
 
-impl Stage for HolePattern {
+impl TouchPattern for HolePattern {
     fn next(&mut self, context: &mut SearchContext) -> Result<Option<TouchPlan>, ExploreError> {
         let (ball, middle) = (context.params.ball_radius, self.wall.middle);
         Ok(Some(match self.phase {
@@ -104,7 +104,7 @@ impl Stage for HolePattern {
         }))
     }
 
-    fn take(&mut self, context: &mut SearchContext, touch: &Touched) {
+    fn take(&mut self, context: &mut SearchContext, touch: &PatternStep) {
         match self.phase {
             HolePhase::Opening => {
                 if let Some(place) = self.opening.take(context, touch) {

@@ -5,8 +5,8 @@ use nalgebra::Point3;
 use super::cylinder_fit::surface_about;
 use super::hole::numbers;
 use crate::plan::error::ExploreError;
-use crate::plan::measuring::{Measuring, Possible, Wanted};
-use crate::plan::pattern::{Stage, Touched};
+use crate::plan::measuring::{CandidateTouch, Measuring, SurfaceRequest};
+use crate::plan::pattern::{PatternStep, TouchPattern};
 use crate::plan::search::{ROUGH, hexagonal};
 use crate::plan::search_context::{PatternParams, SearchContext, TouchPlan, TouchResult, toward};
 use crate::plan::slide::Slide;
@@ -47,9 +47,9 @@ impl PlanePattern {
         }
     }
 
-    fn wanted(params: &PatternParams) -> Wanted {
+    fn wanted(params: &PatternParams) -> SurfaceRequest {
         // equally certain at the rim of the field and in its middle
-        Wanted::of_plane(
+        SurfaceRequest::of_plane(
             params,
             &[Freedom::TiltX, Freedom::TiltY],
             params.flag_radius,
@@ -58,14 +58,14 @@ impl PlanePattern {
         )
     }
 
-    fn possible(&self, context: &SearchContext) -> Vec<Possible> {
+    fn possible(&self, context: &SearchContext) -> Vec<CandidateTouch> {
         let PatternParams {
             clearance,
             ball_radius,
             ..
         } = context.params;
         let search = clearance + ball_radius + ROUGH;
-        let at = |place: &Point3<f64>| Possible {
+        let at = |place: &Point3<f64>| CandidateTouch {
             point: context.pose_of * Point3::new(place.x, place.y, context.height),
             travel: clearance,
             planned: context.down(place, search),
@@ -88,13 +88,13 @@ impl PlanePattern {
     }
 }
 
-impl Stage for PlanePattern {
+impl TouchPattern for PlanePattern {
     fn next(&mut self, context: &mut SearchContext) -> Result<Option<TouchPlan>, ExploreError> {
         let possible = self.possible(context);
         if self.first < FIRST {
             // a third of a turn apart, near the rim
             let direction = toward(self.first as f64 / FIRST as f64);
-            let far = |p: &Possible| context.in_f(&p.point).coords.dot(&direction);
+            let far = |p: &CandidateTouch| context.in_f(&p.point).coords.dot(&direction);
             let farthest = possible
                 .into_iter()
                 .max_by(|a, b| far(a).total_cmp(&far(b)));
@@ -107,7 +107,7 @@ impl Stage for PlanePattern {
         ))
     }
 
-    fn take(&mut self, context: &mut SearchContext, touch: &Touched) {
+    fn take(&mut self, context: &mut SearchContext, touch: &PatternStep) {
         self.first += 1;
         self.measuring.take(touch);
         let Some(place) = touch

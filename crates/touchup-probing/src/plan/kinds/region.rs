@@ -3,7 +3,7 @@
 use nalgebra::Point3;
 
 use crate::plan::error::ExploreError;
-use crate::plan::pattern::{Stage, Touched};
+use crate::plan::pattern::{PatternStep, TouchPattern};
 use crate::plan::search::{ROUGH, hexagonal};
 use crate::plan::search_context::{PatternParams, SearchContext, TouchPlan};
 use crate::plan::slide::Slide;
@@ -46,7 +46,7 @@ impl RegionPattern {
     }
 }
 
-impl Stage for RegionPattern {
+impl TouchPattern for RegionPattern {
     fn next(&mut self, context: &mut SearchContext) -> Result<Option<TouchPlan>, ExploreError> {
         let PatternParams {
             clearance,
@@ -60,7 +60,7 @@ impl Stage for RegionPattern {
             .map(|place| context.down(place, clearance + ball_radius + depth.max(ROUGH))))
     }
 
-    fn take(&mut self, context: &mut SearchContext, touch: &Touched) {
+    fn take(&mut self, context: &mut SearchContext, touch: &PatternStep) {
         self.places.pop();
         self.surface.push(
             touch

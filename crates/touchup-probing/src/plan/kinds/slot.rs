@@ -18,17 +18,18 @@ use nalgebra::{Point3, Vector3};
 use super::cylinder_fit::{squareness, surface_about};
 use super::hole::numbers;
 use super::slot_fit::{CORNER, SlotFit};
-use crate::plan::design::{Asked, Knowledge};
+use crate::plan::design::{Knowledge, TargetUncertainties};
 use crate::plan::error::ExploreError;
-use crate::plan::measuring::{Measuring, Possible, Wanted};
-use crate::plan::pattern::{Stage, Touched};
+use crate::plan::measuring::{CandidateTouch, Measuring, SurfaceRequest};
+use crate::plan::pattern::{PatternStep, TouchPattern};
 use crate::plan::search::{BELOW_RIM, BESIDE, CHAMFER, OpeningSearch, REACH, ROUGH, SHALLOW};
 use crate::plan::search_context::{
-    AROUND, OpenNumbers, PatternParams, Quantity, SearchContext, TouchPlan, TouchResult, toward,
+    AROUND, FeatureQuantity, OpenNumbers, PatternParams, SearchContext, TouchPlan, TouchResult,
+    toward,
 };
 use crate::plan::slide::{RimStation, Slide, stadium_rim};
 use touchup_features::features::fit::{
-    Ends, FitParams, Freedom, Observation, Stadium, Surface, fit,
+    Ends, FitParams, Freedom, Observation, Stadium, SurfaceModel, fit,
 };
 use touchup_features::features::{End, Feature};
 
@@ -179,10 +180,10 @@ impl SlotPattern {
         )
     }
 
-    fn wanted(&self, context: &SearchContext, walls: &Stadium) -> Wanted {
+    fn wanted(&self, context: &SearchContext, walls: &Stadium) -> SurfaceRequest {
         let params = &context.params;
         let (sigma, (lean, fit)) = (params.sigma, self.squareness(context, walls));
-        let asked = Asked::default();
+        let asked = TargetUncertainties::default();
         let asked = match params.quantity {
             _ if context
                 .open
@@ -199,11 +200,11 @@ impl SlotPattern {
                 let asked = size.map_or(asked.clone(), |sigma| asked.each(&[Freedom::Size], sigma));
                 length.map_or(asked.clone(), |sigma| asked.each(&[Freedom::Second], sigma))
             }
-            Quantity::Position => asked.each(&[Freedom::X, Freedom::Y], sigma),
-            Quantity::Axis => asked.each(&[Freedom::TiltX, Freedom::TiltY], sigma),
-            Quantity::Length => asked.each(&[Freedom::Second], sigma),
-            Quantity::Width => asked.each(&[Freedom::Size], sigma),
-            Quantity::All | Quantity::Diameter => {
+            FeatureQuantity::Position => asked.each(&[Freedom::X, Freedom::Y], sigma),
+            FeatureQuantity::Axis => asked.each(&[Freedom::TiltX, Freedom::TiltY], sigma),
+            FeatureQuantity::Length => asked.each(&[Freedom::Second], sigma),
+            FeatureQuantity::Width => asked.each(&[Freedom::Size], sigma),
+            FeatureQuantity::All | FeatureQuantity::Diameter => {
                 // direction as certain as the ends
                 let asked = asked.each(&[Freedom::X, Freedom::Y], sigma);
                 asked
@@ -211,7 +212,7 @@ impl SlotPattern {
                     .each(&[Freedom::Second, Freedom::Size], sigma)
             }
         };
-        Wanted {
+        SurfaceRequest {
             before: Knowledge::before::<Stadium>(walls.length, lean),
             asked: asked.and_the_rest::<Stadium>(sigma, walls.width / 2.0),
             fit,
@@ -282,7 +283,7 @@ impl SlotPattern {
         context: &SearchContext,
         walls: &Stadium,
         part: Option<(f64, [f64; 2])>,
-    ) -> Vec<Possible> {
+    ) -> Vec<CandidateTouch> {
         if walls.ends == Ends::Straight {
             return self.possible_straight(context, walls, part);
         }
@@ -314,7 +315,7 @@ impl SlotPattern {
         context: &SearchContext,
         walls: &Stadium,
         part: Option<(f64, [f64; 2])>,
-    ) -> Vec<Possible> {
+    ) -> Vec<CandidateTouch> {
         let (ball, radius, half) = (
             context.params.ball_radius,
             walls.width / 2.0,
@@ -356,7 +357,7 @@ impl SlotPattern {
         places: impl Iterator<Item = (Point3<f64>, Vector3<f64>)>,
         radius: f64,
         travel: f64,
-    ) -> Vec<Possible> {
+    ) -> Vec<CandidateTouch> {
         let depths = [BELOW_RIM * context.params.ball_radius, self.depth];
         let in_f = |v: Vector3<f64>| {
             context
@@ -366,7 +367,7 @@ impl SlotPattern {
         let planned = |(place, direction): (Point3<f64>, Vector3<f64>), depth: f64| {
             let from = context.in_f(&(walls.pose_of * place));
             let point = walls.pose_of * (place - Vector3::z() * depth + direction * radius);
-            Possible {
+            CandidateTouch {
                 point,
                 travel,
                 planned: context.sideways(&from, depth, &in_f(direction), travel + BEYOND),
@@ -375,7 +376,7 @@ impl SlotPattern {
         context.on_part(places.flat_map(|place| depths.map(|depth| planned(place, depth))))
     }
 
-    fn take_first(&mut self, context: &SearchContext, touch: &Touched) {
+    fn take_first(&mut self, context: &SearchContext, touch: &PatternStep) {
         self.take_wall(touch);
         self.tried += 1;
         if touch.result == TouchResult::Unclear {
@@ -404,14 +405,14 @@ impl SlotPattern {
     }
 
     /// Takes a touch of a search for walls.
-    fn take_wall(&mut self, touch: &Touched) {
+    fn take_wall(&mut self, touch: &PatternStep) {
         self.measuring.take(touch);
         if touch.result == TouchResult::Nothing {
             self.free.push(touch.planned.end());
         }
     }
 
-    fn take_around(&mut self, context: &mut SearchContext, touch: &Touched) {
+    fn take_around(&mut self, context: &mut SearchContext, touch: &PatternStep) {
         self.opening.top.extend(touch.observation);
         self.tried += 1;
         if self.tried >= AROUND {
@@ -422,7 +423,7 @@ impl SlotPattern {
         }
     }
 
-    fn take_end(&mut self, context: &SearchContext, touch: &Touched, sign: f64, beyond: f64) {
+    fn take_end(&mut self, context: &SearchContext, touch: &PatternStep, sign: f64, beyond: f64) {
         self.take_wall(touch);
         self.tried += 1;
         let ball = context.params.ball_radius;
@@ -439,7 +440,7 @@ impl SlotPattern {
         }
     }
 
-    fn take_floor(&mut self, context: &SearchContext, touch: &Touched) {
+    fn take_floor(&mut self, context: &SearchContext, touch: &PatternStep) {
         self.floor = touch.observation.map(|contact| context.end(&contact));
         if let Some(centre) = touch.place {
             self.depth = context.above_floor(self.depth, &centre);
@@ -466,7 +467,7 @@ pub(in crate::plan) fn around_stadium(half: f64, count: usize) -> impl Iterator<
     sides.chain(ends)
 }
 
-impl Stage for SlotPattern {
+impl TouchPattern for SlotPattern {
     #[expect(clippy::too_many_lines)]
     fn next(&mut self, context: &mut SearchContext) -> Result<Option<TouchPlan>, ExploreError> {
         let ball = context.params.ball_radius;
@@ -546,7 +547,7 @@ impl Stage for SlotPattern {
         }))
     }
 
-    fn take(&mut self, context: &mut SearchContext, touch: &Touched) {
+    fn take(&mut self, context: &mut SearchContext, touch: &PatternStep) {
         match self.phase {
             SlotPhase::Opening => {
                 if let Some(place) = self.opening.take(context, touch) {

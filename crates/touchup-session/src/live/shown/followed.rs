@@ -4,7 +4,7 @@ use std::collections::{HashMap, HashSet};
 
 use super::groups::Groups;
 use touchup_geometry::mesh::{
-    Changes, FaceId, IdSet, MeshError, Simplified, TriMesh, VertexId, triangle,
+    Changes, FaceId, IdSet, MeshError, SimplifiedMesh, TriMesh, VertexId, triangle,
 };
 use touchup_method::haptic::Refiner;
 use touchup_method::reconstruct::Support;
@@ -54,7 +54,7 @@ pub(super) struct FollowedScan {
 #[derive(Clone, Copy, Debug)]
 pub(in crate::live) struct Scans<'a> {
     pub original: &'a TriMesh,
-    pub simplified: &'a Simplified,
+    pub simplified: &'a SimplifiedMesh,
 }
 
 impl FollowedScan {

@@ -15,12 +15,12 @@ use touchup_method::reconstruct::{PatchDelta, Support};
 
 /// The shown mesh.
 #[derive(Debug)]
-pub(super) struct Shown {
+pub(super) struct ShownMesh {
     followed: FollowedScan,
     at_rest: AtRest,
 }
 
-impl Shown {
+impl ShownMesh {
     /// The scan itself.
     pub fn new(scans: Scans<'_>) -> Self {
         Self {

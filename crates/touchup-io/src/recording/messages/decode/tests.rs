@@ -4,23 +4,23 @@ use serde::de::DeserializeSeed;
 use touchup_method::stylus::Wrench;
 
 use super::super::cdr::{encode_pose, encode_wrench};
-use super::super::wire::Wire;
+use super::super::wire::WireFormat;
 use super::*;
 use crate::recording::layout::TopicKind;
 use crate::recording::{LiveType, SampleKind};
 
 const POSE: MessageFormat = MessageFormat {
     message_type: MessageType::PoseStamped,
-    wire: Wire::Cdr,
+    wire: WireFormat::Cdr,
 };
 const WRENCH: MessageFormat = MessageFormat {
     message_type: MessageType::WrenchStamped,
-    wire: Wire::Cdr,
+    wire: WireFormat::Cdr,
 };
 
 fn decode_pose(payload: &[u8]) -> Result<(String, StampedPose), BadMessage> {
     match decode(POSE, payload, 0)? {
-        Decoded::Record(frame, Record::Message(Message::Pose(pose))) => Ok((frame, pose)),
+        MessageContent::Record(frame, Record::Message(Message::Pose(pose))) => Ok((frame, pose)),
         _ => panic!("a pose is one"),
     }
 }
@@ -221,12 +221,12 @@ fn a_state_of_a_franka_gives_the_tool_and_the_wrench_in_the_base() {
     let whole = [&head[..], &ros1, &[0; 75]].concat();
     let format = MessageFormat {
         message_type: MessageType::FrankaState,
-        wire: Wire::Ros1,
+        wire: WireFormat::Ros1,
     };
-    let Ok(Decoded::State(state)) = decode(format, &whole, 0) else {
+    let Ok(MessageContent::State(state)) = decode(format, &whole, 0) else {
         panic!("a state is one")
     };
-    let ArmState {
+    let FrankaSample {
         pose_frame,
         pose,
         wrench_frame,

@@ -14,15 +14,15 @@ use crate::ur::protocol::tests::STATE;
 use touchup_session::clock::ManualClock;
 
 const MS: Duration = Duration::from_millis(1);
-const UP: Action = Action::Move {
+const UP: OrderAction = OrderAction::Move {
     twist: [0.0, 0.0, 20e-3, 0.0, 0.0, 0.0],
     acceleration: 1.0,
 };
 const GOING_UP: LibraryCall = Speed(20e-3, 1.0);
 
-fn press(angle: f64, force_n: f64) -> Action {
+fn press(angle: f64, force_n: f64) -> OrderAction {
     let frame = [0.0, 0.0, 0.0, angle, 0.0, 0.0];
-    Action::Press {
+    OrderAction::Press {
         frame,
         force_n,
         speed: 5e-3,
@@ -247,7 +247,7 @@ impl ControlBench {
         }
     }
 
-    fn order(&self, driver: &mut Driver<'_, Fake>, number: u64, what: Action) {
+    fn order(&self, driver: &mut Driver<'_, Fake>, number: u64, what: OrderAction) {
         self.see_again();
         self.sleeping(|| driver.turn(Some(Order { number, what })))
             .unwrap();
@@ -327,7 +327,7 @@ fn at_rest_it_is_fed_each_20_ms_and_with_each_order_while_the_program_runs() {
     let mut driver = bench.driver();
     bench.without_orders(&mut driver, 45);
     assert_eq!(bench.calls(), [(20, Feed), (40, Feed)]);
-    bench.order(&mut driver, 1, Action::Stop { deceleration: 1.0 });
+    bench.order(&mut driver, 1, OrderAction::Stop { deceleration: 1.0 });
     bench.without_orders(&mut driver, 20);
     assert_eq!(bench.calls(), [(45, Feed), (65, Feed)]);
     bench.fake.is_running.set(false);
@@ -340,7 +340,7 @@ fn a_call_that_hangs_feeds_nothing_and_is_not_served() {
     let bench = ControlBench::new();
     let mut driver = bench.driver();
     bench.fake.takes.set(500 * MS);
-    bench.order(&mut driver, 1, Action::Zero);
+    bench.order(&mut driver, 1, OrderAction::Zero);
     assert_eq!(bench.shared.number(), 1);
     bench.fake.takes.set(Duration::ZERO);
     bench.without_orders(&mut driver, 5);
@@ -355,7 +355,7 @@ fn a_stop_brakes_as_commanded_and_ends_hard_when_the_state_shows_rest_20_ms_late
     bench.order(&mut driver, 1, UP);
     // the states do not show the motion yet
     bench.goes(0.0, Playing);
-    bench.order(&mut driver, 2, Action::Stop { deceleration: 0.5 });
+    bench.order(&mut driver, 2, OrderAction::Stop { deceleration: 0.5 });
     bench.without_orders(&mut driver, 30);
     let braking = [0, 5, 10, 15, 20, 25].map(|ms| (ms, Speed(0.0, 0.5)));
     assert_eq!(
@@ -456,7 +456,7 @@ fn another_tool_than_the_set_one_and_a_lost_connection_end_it() {
     bench.fake.is_connected.set(false);
     assert!(matches!(
         bench.driver().run(&orders),
-        Err(DriverEnd::Lost(Link::Control))
+        Err(DriverEnd::Lost(RtdeConnection::Control))
     ));
     assert_eq!(bench.reports(), [ClientReport::Ready]);
 }
@@ -481,9 +481,9 @@ fn of_orders_that_wait_the_newest_counts_and_no_zero_is_left_out() {
     let (sender, orders) = channel();
     for (number, what) in [
         (2, UP),
-        (3, Action::Zero),
+        (3, OrderAction::Zero),
         (4, UP),
-        (5, Action::Stop { deceleration: 1.0 }),
+        (5, OrderAction::Stop { deceleration: 1.0 }),
     ] {
         sender.send(Order { number, what }).unwrap();
     }
@@ -505,14 +505,14 @@ fn of_orders_that_wait_the_newest_counts_and_no_zero_is_left_out() {
 #[test]
 fn an_order_that_fails_leaves_it_braking_until_it_is_seen_at_rest() {
     for (fails, braked) in [
-        (Action::Stop { deceleration: 0.5 }, Speed(0.0, 0.5)),
+        (OrderAction::Stop { deceleration: 0.5 }, Speed(0.0, 0.5)),
         (UP, Speed(0.0, 2.0)),
     ] {
         brakes_after_a_failed(fails, braked);
     }
 }
 
-fn brakes_after_a_failed(order: Action, braked: LibraryCall) {
+fn brakes_after_a_failed(order: OrderAction, braked: LibraryCall) {
     let bench = ControlBench::new();
     let mut driver = bench.driver();
     bench.shared.is_ready.store(true, Ordering::Release);
@@ -590,7 +590,7 @@ fn force_mode_is_ended_also_where_the_call_that_began_it_failed() {
     bench.fake.refuses.set(true);
     bench.order(&mut driver, 1, press(0.0, 5.0));
     bench.fake.refuses.set(false);
-    bench.order(&mut driver, 2, Action::Stop { deceleration: 0.5 });
+    bench.order(&mut driver, 2, OrderAction::Stop { deceleration: 0.5 });
     let calls: Vec<_> = bench.calls().into_iter().map(|(_, call)| call).collect();
     assert_eq!(
         calls,
@@ -620,7 +620,7 @@ fn a_sensor_is_not_zeroed_on_an_arm_that_does_not_come_to_rest() {
     let mut driver = bench.driver();
     bench.goes(20e-3, Playing);
     bench.order(&mut driver, 1, UP);
-    bench.order(&mut driver, 2, Action::Zero);
+    bench.order(&mut driver, 2, OrderAction::Zero);
     let calls = bench.calls();
     assert!(
         calls[1..].iter().all(|(_, call)| *call == Speed(0.0, 2.0)),

@@ -19,10 +19,11 @@ use crate::ur::child::states::LastReport;
 use crate::ur::guard::{AGAIN, ClientLoss, GuardState};
 use crate::ur::params::Deadlines;
 use crate::ur::protocol::{
-    Action, Begin, ClientReport, Link, Order, PERIOD, ProgramState, UrState, vector_of,
+    Begin, ClientReport, Order, OrderAction, PERIOD, ProgramState, RtdeConnection, UrState,
+    vector_of,
 };
 use touchup_method::stylus::Payload;
-use touchup_probing::arm::{Arm, ArmError, ArmState, Command, Freshness, Safety, Slowed};
+use touchup_probing::arm::{Arm, ArmError, ArmState, Command, Freshness, Safety, SpeedReduction};
 use touchup_session::clock::{Clock, ManualClock};
 use touchup_sim::{ArmParams, Plate, WEIGHTLESS};
 
@@ -42,7 +43,7 @@ pub const STEP: Duration = Duration::from_millis(2);
 const READY: Duration = Duration::from_secs(3);
 /// Record of the model at one time.
 #[derive(Clone, Copy)]
-pub struct Moment {
+pub struct ModelSample {
     /// s
     pub time: f64,
     /// linear plus angular, m/s and rad/s
@@ -52,7 +53,7 @@ pub struct Moment {
 }
 
 /// Controller, client and guard, on one clock.
-pub struct World<'a> {
+pub struct ScriptedChain<'a> {
     controller: RefCell<Controller<'a>>,
     hand: ManualClock,
     clock: Clock,
@@ -66,7 +67,7 @@ pub struct World<'a> {
     states: RefCell<States>,
     /// next events and their times, s
     pub script: RefCell<VecDeque<(f64, String)>>,
-    pub record: RefCell<Vec<Moment>>,
+    pub record: RefCell<Vec<ModelSample>>,
     /// end of the caller's delay, s
     held_until: Cell<f64>,
     /// time of an unanswered stop request to the dashboard
@@ -77,7 +78,7 @@ pub struct World<'a> {
     is_killed: Cell<bool>,
 }
 
-impl<'a> World<'a> {
+impl<'a> ScriptedChain<'a> {
     /// - `script`: events and their times, s, in order.
     pub fn new(surface: &'a Plate, script: Vec<(f64, String)>, seed: u64) -> Self {
         let (clock, hand) = Clock::manual();
@@ -166,7 +167,7 @@ impl<'a> World<'a> {
         controller.tick();
         let [linear, angular] = controller.body.velocity();
         let speed = linear.norm() + angular.norm();
-        self.record.borrow_mut().push(Moment {
+        self.record.borrow_mut().push(ModelSample {
             time: controller.body.time,
             speed,
             force: controller.body.true_force(),
@@ -188,7 +189,7 @@ impl<'a> World<'a> {
         }
         if self.is_dropped.get() {
             return self.take(ClientReport::Lost {
-                which: Link::States,
+                which: RtdeConnection::States,
             });
         }
         let state = newest.map(|states| {
@@ -310,7 +311,7 @@ impl<'a> World<'a> {
 }
 
 /// The library: looks at its newest states, waits for a ready program, and writes registers.
-pub struct Library<'a, 'b>(pub &'b World<'a>);
+pub struct Library<'a, 'b>(pub &'b ScriptedChain<'a>);
 
 impl Library<'_, '_> {
     fn may_send(&self) -> bool {
@@ -452,7 +453,7 @@ impl Control for Library<'_, '_> {
 
 /// An arm behind driver and guard.
 pub struct ScriptedArm<'a, 'b> {
-    world: &'b World<'a>,
+    world: &'b ScriptedChain<'a>,
     library: &'b Library<'a, 'b>,
     driver: Driver<'b, Library<'a, 'b>>,
     params: UrParams,
@@ -464,7 +465,10 @@ pub struct ScriptedArm<'a, 'b> {
 
 impl<'a, 'b> ScriptedArm<'a, 'b> {
     /// Connects as `UrArm::connect`.
-    pub fn connect(world: &'b World<'a>, library: &'b Library<'a, 'b>) -> Result<Self, ArmError> {
+    pub fn connect(
+        world: &'b ScriptedChain<'a>,
+        library: &'b Library<'a, 'b>,
+    ) -> Result<Self, ArmError> {
         world.upload();
         let mut driver = Driver::new(library, &world.shared, &world.begin, world.clock.clone());
         driver.prepare().map_err(|end| ArmError::Client {
@@ -498,7 +502,7 @@ impl<'a, 'b> ScriptedArm<'a, 'b> {
         }
     }
 
-    fn send(&mut self, what: Action) -> u64 {
+    fn send(&mut self, what: OrderAction) -> u64 {
         let number = self
             .world
             .guard
@@ -517,7 +521,7 @@ impl<'a, 'b> ScriptedArm<'a, 'b> {
         let zero = self
             .waiting
             .iter()
-            .position(|order| order.what == Action::Zero);
+            .position(|order| order.what == OrderAction::Zero);
         let taken = zero.map_or(self.waiting.len(), |at| at + 1);
         let order = self.waiting.drain(..taken).next_back();
         let is_due = self.world.clock.since(self.looked) >= TURN;
@@ -562,7 +566,7 @@ impl Arm for ScriptedArm<'_, '_> {
     }
 
     fn zero_sensor(&mut self) -> Result<(), ArmError> {
-        let number = self.send(Action::Zero);
+        let number = self.send(OrderAction::Zero);
         while self.world.guard.borrow().done < number {
             self.broken()?;
             self.step();
@@ -603,7 +607,7 @@ impl Arm for ScriptedArm<'_, '_> {
         PERIOD
     }
 
-    fn slowed(&self) -> Option<Slowed> {
+    fn slowed(&self) -> Option<SpeedReduction> {
         self.last.slowed()
     }
 }

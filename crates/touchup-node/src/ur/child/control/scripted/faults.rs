@@ -3,7 +3,7 @@
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-use super::chain::{Library, Moment, STEP, ScriptedArm, World};
+use super::chain::{Library, ModelSample, STEP, ScriptedArm, ScriptedChain};
 use super::session::{ProbingSession, limits};
 use touchup_probing::arm::{Arm, ProbeError, TouchParams};
 use touchup_sim::Plate;
@@ -19,19 +19,19 @@ const QUIET: f64 = 2.0;
 const FOUND: f64 = 0.1e-3;
 
 /// Result of a script.
-struct Outcome {
+struct ScriptOutcome {
     error: Option<ProbeError>,
     /// time of the report, s
     at: f64,
     touches: usize,
-    record: Vec<Moment>,
+    record: Vec<ModelSample>,
     /// missing states up to the report of the fault
     missing: i64,
     /// time at which the arm took commands again, s, and surface error of the next touch, m
     recovered: Option<(f64, Result<Option<f64>, String>)>,
 }
 
-impl Outcome {
+impl ScriptOutcome {
     /// The last time before the recovery at which the arm moved, s.
     fn stood_at(&self) -> f64 {
         self.before()
@@ -40,7 +40,7 @@ impl Outcome {
     }
 
     /// Records before the next order.
-    fn before(&self) -> impl DoubleEndedIterator<Item = &Moment> {
+    fn before(&self) -> impl DoubleEndedIterator<Item = &ModelSample> {
         let until = self.recovered.as_ref().map_or(f64::INFINITY, |(at, _)| *at);
         self.record
             .iter()
@@ -63,10 +63,10 @@ impl Outcome {
 }
 
 /// Touches until some time (s); after a fault waits two seconds without orders, then goes on.
-fn played(script: Vec<(f64, String)>, seed: u64, seconds: f64) -> Outcome {
+fn played(script: Vec<(f64, String)>, seed: u64, seconds: f64) -> ScriptOutcome {
     let over = script.last().map_or(0.0, |(at, _)| at + 0.1);
     let plate = Plate::default();
-    let world = World::new(&plate, script, seed);
+    let world = ScriptedChain::new(&plate, script, seed);
     let library = Library(&world);
     let mut session = ProbingSession::new(&world, ScriptedArm::connect(&world, &library).unwrap());
     let error = session.probe(seconds).err();
@@ -82,7 +82,7 @@ fn played(script: Vec<(f64, String)>, seed: u64, seconds: f64) -> Outcome {
         Err(error) => (world.now(), Err(error.to_string())),
     });
     drop(session);
-    Outcome {
+    ScriptOutcome {
         error,
         at,
         touches,
@@ -93,7 +93,7 @@ fn played(script: Vec<(f64, String)>, seed: u64, seconds: f64) -> Outcome {
 }
 
 /// A kind of fault.
-pub struct Kind {
+pub struct FaultKind {
     pub line: &'static str,
     /// line that ends it; empty: none
     ends: &'static str,
@@ -117,188 +117,188 @@ const UNHEARD: &[&str] = &[
 /// For a command that takes longer than a cycle the deadline of its call counts.
 const HANGS: &[&str] = &["counted no cycle", "has not returned"];
 
-pub const KINDS: &[Kind] = &[
-    Kind {
+pub const KINDS: &[FaultKind] = &[
+    FaultKind {
         line: "pause",
         ends: "resume",
         stands: Some(0.05),
         reasons: &["was paused"],
     },
-    Kind {
+    FaultKind {
         line: "open",
         ends: "shut",
         stands: Some(0.05),
         reasons: &["by the operator", "was paused"],
     },
-    Kind {
+    FaultKind {
         line: "protective",
         ends: "",
         stands: Some(0.05),
         reasons: &["protective stop"],
     },
-    Kind {
+    FaultKind {
         line: "operator",
         ends: "release",
         stands: Some(0.05),
         reasons: &["by the operator", "has ended"],
     },
-    Kind {
+    FaultKind {
         line: "halt",
         ends: "",
         stands: Some(0.05),
         reasons: &["has ended"],
     },
-    Kind {
+    FaultKind {
         line: "off",
         ends: "on",
         stands: Some(0.05),
         reasons: &["has ended"],
     },
-    Kind {
+    FaultKind {
         line: "local",
         ends: "remote",
         stands: Some(0.05),
         reasons: &["has ended"],
     },
-    Kind {
+    FaultKind {
         line: "drop",
         ends: "",
         stands: Some(0.05),
         reasons: &["was closed"],
     },
-    Kind {
+    FaultKind {
         line: "undash",
         ends: "",
         stands: Some(0.05),
         reasons: &["was closed"],
     },
-    Kind {
+    FaultKind {
         line: "die",
         ends: "mend",
         stands: Some(0.05),
         reasons: &["was closed"],
     },
-    Kind {
+    FaultKind {
         line: "silent",
         ends: "mend",
         stands: Some(0.2),
         reasons: &["has come", "states came", "has not returned"],
     },
-    Kind {
+    FaultKind {
         line: "unplug",
         ends: "mend",
         stands: Some(0.2),
         reasons: &["has come", "states came", "has ended"],
     },
-    Kind {
+    FaultKind {
         line: "deaf",
         ends: "mend",
         stands: Some(0.2),
         reasons: UNHEARD,
     },
-    Kind {
+    FaultKind {
         line: "stuck",
         ends: "mend",
         stands: Some(0.2),
         reasons: HANGS,
     },
-    Kind {
+    FaultKind {
         line: "hung",
         ends: "mend",
         stands: Some(0.2),
         reasons: HANGS,
     },
-    Kind {
+    FaultKind {
         line: "slow 3",
         ends: "mend",
         stands: Some(0.2),
         reasons: HANGS,
     },
-    Kind {
+    FaultKind {
         line: "slow 2",
         ends: "mend",
         stands: None,
         reasons: &[],
     },
-    Kind {
+    FaultKind {
         line: "tired",
         ends: "mend",
         stands: None,
         reasons: UNHEARD,
     },
-    Kind {
+    FaultKind {
         line: "late states 40",
         ends: "mend",
         stands: None,
         reasons: &["states came", "has come", "N at (", "N over", "ms behind"],
     },
-    Kind {
+    FaultKind {
         line: "late orders 40",
         ends: "mend",
         stands: None,
         reasons: &["are ordered", "N at (", "N over"],
     },
-    Kind {
+    FaultKind {
         line: "spike 40",
         ends: "",
         stands: None,
         reasons: &["over the limit", "N at ("],
     },
-    Kind {
+    FaultKind {
         line: "raise 3",
         ends: "raise -3",
         stands: None,
         reasons: &["N at (", "over the limit", "N at rest", "protective stop"],
     },
-    Kind {
+    FaultKind {
         line: "slider 5",
         ends: "slider 100",
         stands: None,
         reasons: &["its speed slider is at 5 %"],
     },
-    Kind {
+    FaultKind {
         line: "reduced",
         ends: "full",
         stands: None,
         reasons: &["reduced mode"],
     },
-    Kind {
+    FaultKind {
         line: "noise 0.3",
         ends: "noise 0",
         stands: None,
         reasons: &["N at ("],
     },
-    Kind {
+    FaultKind {
         line: "payload 1.5",
         ends: "",
         stands: None,
         reasons: &["N at (", "N at rest", "over the limit"],
     },
-    Kind {
+    FaultKind {
         line: "rate 125",
         ends: "rate 500",
         stands: None,
         reasons: &["states came"],
     },
-    Kind {
+    FaultKind {
         line: "drift 1",
         ends: "steady",
         stands: None,
         reasons: &["N at (", "N at rest", "N over", "pulls with"],
     },
-    Kind {
+    FaultKind {
         line: "hold 300",
         ends: "",
         stands: None,
         reasons: &["states came", "ms behind"],
     },
-    Kind {
+    FaultKind {
         line: "watchdog counts",
         ends: "",
         stands: None,
         reasons: &[],
     },
-    Kind {
+    FaultKind {
         line: "mute",
         ends: "mend",
         stands: None,
@@ -307,7 +307,7 @@ pub const KINDS: &[Kind] = &[
 ];
 
 /// Faults of one script: kind, moment and length, s.
-type Faults = Vec<(&'static Kind, f64, f64)>;
+type Faults = Vec<(&'static FaultKind, f64, f64)>;
 
 /// One or two faults of any kind, at random times from `from` to `until`, s.
 pub fn random_faults(rng: &mut Pcg64, from: f64, until: f64) -> Faults {
@@ -323,7 +323,7 @@ pub fn random_faults(rng: &mut Pcg64, from: f64, until: f64) -> Faults {
     (0..count).map(one).collect()
 }
 
-pub fn script_of(faults: &[(&'static Kind, f64, f64)]) -> Vec<(f64, String)> {
+pub fn script_of(faults: &[(&'static FaultKind, f64, f64)]) -> Vec<(f64, String)> {
     let begin = faults
         .iter()
         .map(|(kind, at, _)| (*at, kind.line.to_owned()));
@@ -345,7 +345,7 @@ fn is_true(words: &str, faults: &Faults) -> bool {
 
 /// Error in the end of a script.
 #[expect(clippy::too_many_lines)]
-fn judged(faults: &Faults, outcome: &Outcome) -> Option<String> {
+fn judged(faults: &Faults, outcome: &ScriptOutcome) -> Option<String> {
     let has = |lines: &[&str]| faults.iter().any(|(kind, ..)| lines.contains(&kind.line));
     if let Some(error) = &outcome.error {
         let words = error.to_string();
@@ -537,7 +537,7 @@ fn moments() -> [(&'static str, f64); 4] {
         free.iter()
             .filter(|moment| moment.time > 2.0 && moment.time < 7.0)
     };
-    let first = |is_it: &dyn Fn(&&Moment) -> bool| later().find(is_it).unwrap().time;
+    let first = |is_it: &dyn Fn(&&ModelSample) -> bool| later().find(is_it).unwrap().time;
     let link = later()
         .max_by(|a, b| a.speed.total_cmp(&b.speed))
         .unwrap()

@@ -3,7 +3,7 @@
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-use super::chain::{Library, STEP, ScriptedArm, World};
+use super::chain::{Library, STEP, ScriptedArm, ScriptedChain};
 use super::faults::{random_faults, script_of};
 use super::live_bytes::live_bytes;
 use super::session::{ProbingSession, limits};
@@ -23,7 +23,7 @@ fn hours_of_faults_and_recoveries_leave_no_stuck_state_and_no_memory_behind() {
     let end = 3600.0;
     let mut rng = Pcg64::seed_from_u64(22);
     let plate = Plate::default();
-    let world = World::new(&plate, Vec::new(), 22);
+    let world = ScriptedChain::new(&plate, Vec::new(), 22);
     let library = Library(&world);
     let mut session = ProbingSession::new(&world, ScriptedArm::connect(&world, &library).unwrap());
     let (mut faults, mut reported, mut recoveries, mut peak) = (0, 0, 0, 0.0_f64);
@@ -52,8 +52,9 @@ fn hours_of_faults_and_recoveries_leave_no_stuck_state_and_no_memory_behind() {
             }
             // the arm has stood since, whatever else has happened
             let quiet_since = world.now() - 0.05;
-            let moved =
-                |moment: &&super::chain::Moment| moment.time > quiet_since && moment.speed > 0.0;
+            let moved = |moment: &&super::chain::ModelSample| {
+                moment.time > quiet_since && moment.speed > 0.0
+            };
             let way: f64 = world
                 .record
                 .borrow()

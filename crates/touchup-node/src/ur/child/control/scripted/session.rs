@@ -2,9 +2,10 @@
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 
-use super::chain::{ScriptedArm, World};
+use super::chain::{ScriptedArm, ScriptedChain};
 use touchup_probing::arm::{
-    Arm, ArmState, Limits, Observer, ProbeError, TouchOutcome, TouchParams, TouchTarget, Watched,
+    Arm, ArmState, Limits, Observer, ProbeError, SupervisedArm, TouchOutcome, TouchParams,
+    TouchTarget,
 };
 use touchup_sim::ArmParams;
 
@@ -18,12 +19,12 @@ const BACK_OFF: f64 = 8e-3;
 
 /// Counts the states that the observer did not get.
 #[derive(Default)]
-pub struct Heard {
+pub struct MissedStateCounter {
     last_ns: Option<i64>,
     pub missing: i64,
 }
 
-impl Observer for Heard {
+impl Observer for MissedStateCounter {
     fn on_state(&mut self, state: &ArmState) {
         let periods = self
             .last_ns
@@ -35,9 +36,9 @@ impl Observer for Heard {
 
 /// An arm and its touches.
 pub struct ProbingSession<'a, 'b> {
-    world: &'b World<'a>,
+    world: &'b ScriptedChain<'a>,
     pub arm: ScriptedArm<'a, 'b>,
-    pub heard: Heard,
+    pub heard: MissedStateCounter,
     pub touches: usize,
 }
 
@@ -50,11 +51,11 @@ pub fn limits() -> Limits {
 }
 
 impl<'a, 'b> ProbingSession<'a, 'b> {
-    pub fn new(world: &'b World<'a>, arm: ScriptedArm<'a, 'b>) -> Self {
+    pub fn new(world: &'b ScriptedChain<'a>, arm: ScriptedArm<'a, 'b>) -> Self {
         Self {
             world,
             arm,
-            heard: Heard::default(),
+            heard: MissedStateCounter::default(),
             touches: 0,
         }
     }
@@ -69,7 +70,7 @@ impl<'a, 'b> ProbingSession<'a, 'b> {
     }
 
     fn zero(&mut self) -> Result<(), ProbeError> {
-        Watched::new(&mut self.arm, limits(), &mut self.heard).zero()?;
+        SupervisedArm::new(&mut self.arm, limits(), &mut self.heard).zero()?;
         // states of that time are discarded
         self.heard.last_ns = None;
         Ok(())
@@ -88,7 +89,7 @@ impl<'a, 'b> ProbingSession<'a, 'b> {
             search: 8e-3,
             expected: None,
         };
-        let mut watched = Watched::new(&mut self.arm, limits(), &mut self.heard);
+        let mut watched = SupervisedArm::new(&mut self.arm, limits(), &mut self.heard);
         let record = watched.touch(&target, &TouchParams::default())?;
         self.touches += 1;
         let TouchOutcome::Contact { centre, .. } = record.outcome else {
@@ -116,7 +117,7 @@ impl<'a, 'b> ProbingSession<'a, 'b> {
         above.translation.vector.z += BACK_OFF;
         self.heard.last_ns = None;
         let touch = TouchParams::default();
-        Watched::new(&mut self.arm, limits(), &mut self.heard).leave(
+        SupervisedArm::new(&mut self.arm, limits(), &mut self.heard).leave(
             doing,
             &above,
             BACK_OFF_SPEED,

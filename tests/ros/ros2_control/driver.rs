@@ -1,20 +1,20 @@
 //! Orders and states without faults.
 
 use nalgebra::{Point3, Vector3};
-use touchup::features::Kind;
+use touchup::features::FeatureKind;
 use touchup::probing::arm::{Arm, ArmError, Command, Limits, TouchParams};
-use touchup::probing::execute::{Cell, Ending, Flag, ProbeParams, Prober, Tool};
+use touchup::probing::execute::{Ending, Flag, ProbeParams, Prober, RobotCell, Tool};
 use touchup::probing::plan::PatternParams;
 use touchup::sim::{ArmParams, Plate, SimArm, WEIGHTLESS};
 use touchup::stylus::Payload;
 
 use super::{STOP, bench, bench_with, over, seven, sideways};
 use crate::plate_stream::plate_scan;
-use crate::probing::StaticScan;
+use crate::static_scan::StaticScan;
 
 const HOLE: Flag = Flag {
     id: 7,
-    kind: Some(Kind::Hole),
+    kind: Some(FeatureKind::Hole),
     place: Point3::new(17e-3, 35e-3, 12e-3),
     radius: 3e-3,
 };
@@ -28,7 +28,7 @@ fn probed(simulated: &ArmParams, arm: &mut dyn Arm) -> [f64; 3] {
         pose_ft,
         ..
     } = simulated.clone();
-    let cell = Cell {
+    let cell = RobotCell {
         geometry,
         pose_bo,
         pose_ft,

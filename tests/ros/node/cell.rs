@@ -9,7 +9,7 @@ use nalgebra::Isometry3;
 use tempfile::TempDir;
 use touchup::clock::{Clock, ManualClock};
 use touchup::io::mesh_file::{MeshUnit, write_mesh};
-use touchup::node::{ArmKind, ArmOfNode, Node, NodeEnd, Prepared};
+use touchup::node::{ArmKind, ArmOfNode, Node, NodeEnd, PreparedNode};
 use touchup::probing::arm::{Arm, ArmError, ArmState, Command};
 use touchup::ros::in_process::{OtherParticipants, start};
 use touchup::ros::inbox::inbox;
@@ -96,7 +96,7 @@ impl Cell {
         let (port, world) = start(inbox, &clock);
         world.set_now_ns(1_000_000_000_000);
         let arm = arm(&clock, &world);
-        let node = Prepared::on(clock, parameters)
+        let node = PreparedNode::on(clock, parameters)
             .unwrap()
             .start(port, arrivals, Some(arm))
             .unwrap();

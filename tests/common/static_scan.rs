@@ -4,31 +4,29 @@
 use nalgebra::Point3;
 use touchup::mesh::{FaceHit, FaceTree, TriMesh};
 use touchup::probing::arm::{ArmState, Observer, StopRequest};
-use touchup::probing::execute::{ProbedTouch, Progress, World};
+use touchup::probing::execute::{ProbedTouch, Progress, RobotCell, World};
 use touchup::sim::{Plate, Surface};
-
-use super::cell;
 
 /// A mesh that stays unchanged; it can have the arm stop.
 pub struct StaticScan {
-    pub(super) mesh: TriMesh,
-    pub(super) tree: FaceTree,
+    pub mesh: TriMesh,
+    pub tree: FaceTree,
     /// cancels after this many states
-    pub(super) patience: Option<usize>,
+    pub patience: Option<usize>,
     /// has it stay where it is after this many, and when that was, ns
-    pub(super) stays_after: Option<usize>,
-    pub(super) stayed_ns: i64,
-    pub(super) seen: usize,
-    pub(super) touches: Vec<usize>,
+    pub stays_after: Option<usize>,
+    pub stayed_ns: i64,
+    pub seen: usize,
+    pub touches: Vec<usize>,
     /// as they were made
-    pub(super) made: Vec<ProbedTouch>,
+    pub made: Vec<ProbedTouch>,
     /// what the mesh becomes when more than 2 N is measured
-    pub(super) after: Option<TriMesh>,
+    pub after: Option<TriMesh>,
     /// height of the tip in B when it was wanted to end, and the least since then, m
-    pub(super) since_then: Option<[f64; 2]>,
-    /// the true part, and how near to it the centre of the ball came, m
-    pub(super) part: Option<Plate>,
-    pub(super) nearest: f64,
+    pub since_then: Option<[f64; 2]>,
+    /// the true part in its cell, and how near to it the centre of the ball came, m
+    pub part: Option<(Plate, RobotCell)>,
+    pub nearest: f64,
 }
 
 impl StaticScan {
@@ -66,10 +64,10 @@ impl Observer for StaticScan {
         if Some(self.seen) == self.stays_after {
             self.stayed_ns = state.stamp_ns;
         }
-        if let Some(part) = &self.part {
+        if let Some((part, cell)) = &self.part {
             self.nearest = self
                 .nearest
-                .min(part.signed_distance(&cell().place(&state.pose_bt)));
+                .min(part.signed_distance(&cell.place(&state.pose_bt)));
         }
         let z = state.pose_bt.translation.z;
         if self.stop_request().is_some() {

@@ -11,7 +11,7 @@ use touchup::clock::{Clock, ManualClock};
 use touchup::io::mesh_file::{MeshUnit, write_mesh};
 use touchup::io::recording::{Topics, write_recording};
 use touchup::mesh::TriMesh;
-use touchup::node::{INBOX, Node, NodeEnd, Prepared};
+use touchup::node::{INBOX, Node, NodeEnd, PreparedNode};
 use touchup::ros::in_process::{OtherParticipants, start};
 use touchup::ros::inbox::inbox;
 use touchup::ros::messages::{
@@ -251,7 +251,7 @@ impl Bench {
         let (clock, hand) = Clock::manual();
         let (inbox, arrivals) = inbox(INBOX, &clock);
         let (port, world) = start(inbox, &clock);
-        let node = Prepared::on(clock.clone(), parameters)
+        let node = PreparedNode::on(clock.clone(), parameters)
             .unwrap()
             .start(port, arrivals, None)
             .unwrap();

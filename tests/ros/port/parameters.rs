@@ -6,7 +6,7 @@ use std::fs;
 use std::path::Path;
 
 use touchup::ros::parameters::{
-    Allowed, PARAMETERS, ParameterDescriptor, ParameterValue, Settable,
+    PARAMETERS, ParameterDescriptor, ParameterDomain, ParameterValue, Settable,
 };
 
 /// In every node, so in neither of the two files.
@@ -19,9 +19,11 @@ fn read(file: &str) -> String {
 /// A row of the table as docs/ros.md has it: name, type, default, range, live, what.
 fn row(declared: &ParameterDescriptor) -> [String; 6] {
     let range = match declared.allowed {
-        Allowed::Double(_, from, to) => format!("{from} to {to}"),
-        Allowed::OneOf(_, words) => words.join(", "),
-        Allowed::Bool(_) | Allowed::String(_) | Allowed::SampleType(_) => String::new(),
+        ParameterDomain::Double(_, from, to) => format!("{from} to {to}"),
+        ParameterDomain::OneOf(_, words) => words.join(", "),
+        ParameterDomain::Bool(_) | ParameterDomain::String(_) | ParameterDomain::SampleType(_) => {
+            String::new()
+        }
     };
     let default = declared.default_value();
     let live = match declared.settable {
