@@ -223,7 +223,7 @@ fn beside_pages(faces: usize, turns: usize) {
             };
             let page = WebServer::open(&params, |_| ()).expect("a port is free");
             let port = page
-                .serve_node(facts, inbox, ready.whole_mesh(), port)
+                .serve_node(facts, inbox, ready.mesh_feed(), port)
                 .expect("the services have names");
             let address = page.urls()[0]
                 .trim_start_matches("http://")

@@ -15,7 +15,7 @@
 //! | [`touchup_probing`] | [`probing::plan`] [`probing::arm`] [`probing::execute`] |
 //! | [`touchup_sim`] | [`sim`]: known surfaces, a scanner, a stylus and an arm to test against |
 //! | [`touchup_io`] | [`io`]: mesh files, recordings, tables, pictures |
-//! | [`touchup_session`] | [`clock`], [`threads`], [`scan`], [`scene`], [`replay`], [`refinement`], [`calibration`], [`input_check`], [`live`], [`session`], [`sweep`] |
+//! | [`touchup_session`] | [`clock`], [`threads`], [`scan`], [`scene`], [`replay`], [`refinement`], [`probing_run`], [`calibration`], [`input_check`], [`live`], [`session`], [`sweep`] |
 //! | `touchup-report` | a separate program: error against run time, stability, and the cost of each part |
 //! | this one | `inspection`: a part against its drawing; `html`: text within pages; `ros`: the node (features `ros` and `r2r`); `ros2_control`: an arm behind it; `ur` (feature `ur`): a UR; [`cli`]: one file for each verb |
 #![cfg_attr(not(test), warn(clippy::unwrap_used))]
@@ -31,7 +31,8 @@ pub use touchup_method::{haptic, reconstruct, stylus};
 pub use touchup_node::*;
 pub use touchup_probing as probing;
 pub use touchup_session::{
-    calibration, clock, input_check, live, refinement, replay, scan, scene, session, sweep, threads,
+    calibration, clock, input_check, live, probing_run, refinement, replay, scan, scene, session,
+    sweep, threads,
 };
 pub use {touchup_io as io, touchup_sim as sim};
 

@@ -286,7 +286,7 @@ errors_of_rooms! {
     NodeError => |error| match error {
         NodeError::NoScan | NodeError::RegionWithRobot => ("node", 2),
         NodeError::Scene(error) if matches!(**error, SceneError::NoRadius) => ("usage", 2),
-        NodeError::Scene(_) | NodeError::Scan(_) | NodeError::NothingMoves => ("node", 3),
+        NodeError::Scene(_) | NodeError::Scan(_) | NodeError::Refinement(_) => ("node", 3),
         NodeError::Setting(_) | NodeError::Refine(_) | NodeError::Live(_) => ("node", 3),
         _ => ("node", 1),
     }, "";

@@ -82,13 +82,15 @@ pub(super) fn node(arguments: &NodeArguments, ros: &[String]) -> Result<Losses, 
     let running = ready.start(port, arrivals, arm)?;
     let topics: Vec<_> = config
         .heard_topics()
-        .iter()
+        .into_iter()
         .filter_map(|name| config.resolve(name).ok())
         .collect();
+    let own = config.parameters.has_arm().then(|| "its arm".to_owned());
+    let heard: Vec<_> = own.into_iter().chain(topics).collect();
     print_result(&format!(
         "{} listens to {}; Ctrl-C saves and ends it",
         config.place.full_name(),
-        topics.join(" and ")
+        heard.join(" and ")
     ))?;
     let end = running.join()?;
     print_report(arguments.json, &end.report, || end_text(&end))?;
@@ -106,11 +108,17 @@ struct ConnectedNode {
 }
 
 /// Arm for the parameter `robot`, with its own node on the network.
-fn arm_of(config: &NodeConfig, scene: &Scene) -> Result<Option<ArmOfNode>, CliError> {
-    let robot = config.parameters.string("robot");
-    if robot == "none" {
+///
+/// - `inbox`: of the node, for the measurements of the arm.
+fn arm_of(
+    config: &NodeConfig,
+    scene: &Scene,
+    inbox: &Inbox,
+) -> Result<Option<ArmOfNode>, CliError> {
+    if !config.parameters.has_arm() {
         return Ok(None);
     }
+    let robot = config.parameters.string("robot");
     let why = format!("robot:={robot} touches with a probe: say source:=probe as well");
     require(config.parameters.string("source") == "probe", why)?;
     if scene.probing().is_none() {
@@ -132,7 +140,11 @@ fn arm_of(config: &NodeConfig, scene: &Scene) -> Result<Option<ArmOfNode>, CliEr
     };
     Ok(Some(ArmOfNode {
         kind,
-        samples: ros::samples(&config.beside("_arm"))?,
+        samples: Box::new(ros::ArmSamples {
+            inbox: inbox.clone(),
+            has_poses: config.parameters.pose_frames().is_none(),
+            topics: ros::samples(&config.beside("_arm"))?,
+        }),
     }))
 }
 
@@ -167,14 +179,10 @@ impl NodeArguments {
             ready.folder().display()
         ))?;
         print_result(&self.told(config, &ready).to_string())?;
-        print_result(
-            &ready
-                .cost(config.parameters.string("robot") != "none")
-                .to_string(),
-        )?;
+        print_result(&ready.cost(config.parameters.has_arm()).to_string())?;
         let nominal = self.web.nominal(ready.mesh_unit())?;
         let port = ros::start(config, inbox.clone())?;
-        let arm = arm_of(config, ready.scene())?;
+        let arm = arm_of(config, ready.scene(), &inbox)?;
         Ok(ConnectedNode {
             ready,
             nominal,

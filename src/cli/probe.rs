@@ -109,7 +109,7 @@ pub(super) fn probe(arguments: &ProbeArguments) -> Result<Losses, CliError> {
     };
     let mut ready = probing.ready()?;
     arguments.narrow(&mut ready, &flags)?;
-    if arguments.dry_run || !ready.is_motion_allowed() {
+    if arguments.dry_run || !ready.scene.allows_motion() {
         return arguments.plan_alone(&probing, &ready);
     }
     if !arguments.resume {
@@ -258,11 +258,17 @@ reported! {
     struct PlannedFeature, fn of(id: u32, plan: &Plan) {
         flag: u32 = id,
         touches: usize = plan.touches.len(),
-        unreachable_touches: Vec<Unreachable> = plan.held_back.iter().filter_map(Unreachable::touch).collect(),
+        unreachable_touches: Vec<Unreachable> = Unreachable::of(plan, |what| match what {
+            PlannedMotion::Touch(number) => Some(number),
+            PlannedMotion::Slide(_) => None,
+        }),
         /// Omitted places: the scan has no part there.
         beside_the_part_mm: Vec<[f64; 3]> = plan.left_out.iter().map(|place| (place * 1e3).coords.into()).collect(),
         slides: usize = plan.slides.len(),
-        unreachable_slides: Vec<Unreachable> = plan.held_back.iter().filter_map(Unreachable::slide).collect(),
+        unreachable_slides: Vec<Unreachable> = Unreachable::of(plan, |what| match what {
+            PlannedMotion::Slide(number) => Some(number),
+            PlannedMotion::Touch(_) => None,
+        }),
     }
 }
 
@@ -275,24 +281,13 @@ struct Unreachable {
 }
 
 impl Unreachable {
-    fn touch(HeldBack { what, why }: &HeldBack) -> Option<Self> {
-        let PlannedMotion::Touch(number) = *what else {
-            return None;
+    /// - `number`: index of a motion of the wanted kind.
+    fn of(plan: &Plan, number: impl Fn(PlannedMotion) -> Option<usize>) -> Vec<Self> {
+        let unreachable = |HeldBack { what, why }: &HeldBack| {
+            let (number, reason) = (number(*what)?, why.clone());
+            Some(Self { number, reason })
         };
-        Some(Self {
-            number,
-            reason: why.clone(),
-        })
-    }
-
-    fn slide(HeldBack { what, why }: &HeldBack) -> Option<Self> {
-        let PlannedMotion::Slide(number) = *what else {
-            return None;
-        };
-        Some(Self {
-            number,
-            reason: why.clone(),
-        })
+        plan.held_back.iter().filter_map(unreachable).collect()
     }
 }
 

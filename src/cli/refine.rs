@@ -20,6 +20,7 @@ use touchup_io::mesh_file::{MeshFileError, MeshUnit, check_target};
 use touchup_io::recording::StampSource;
 #[cfg(any(feature = "ros", feature = "r2r"))]
 use touchup_node::node::NodeEnd;
+use touchup_session::live::Pace;
 use touchup_session::refinement::RefinementOptions;
 #[cfg(any(feature = "ros", feature = "r2r"))]
 use touchup_session::replay::{Recording, marker_filter};
@@ -245,7 +246,7 @@ impl RefineArguments {
             touches_out: self.touches_out.clone(),
         };
         let options = RefinementOptions {
-            is_live: self.live,
+            live: self.live.then(Pace::default),
             strokes: self.strokes.clone(),
             registration: self.registration,
             force: self.force,

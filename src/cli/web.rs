@@ -204,7 +204,7 @@ impl WebFlags {
             nominal_file,
             mesh_unit,
         };
-        let port = server.serve_node(facts, inbox, ready.whole_mesh(), network)?;
+        let port = server.serve_node(facts, inbox, ready.mesh_feed(), network)?;
         if !was_open {
             self.announce(&server);
         }

@@ -16,6 +16,7 @@ import time
 import pytest
 from conftest import ROOT
 from ros_cyclone import (
+    BEST_EFFORT,
     LATCHED,
     RELIABLE,
     CancelGoalRequest,
@@ -31,6 +32,7 @@ from ros_cyclone import (
     Peer,
     Point,
     PointStamped,
+    PoseStamped,
     ProbeFeatureRequest,
     ProbeFeatureResponse,
     ProbeResult,
@@ -41,6 +43,7 @@ from ros_cyclone import (
     Time,
     TriggerRequest,
     TriggerResponse,
+    WrenchStamped,
 )
 from ros_domains import domains
 from ros_process import Node
@@ -113,7 +116,8 @@ def running(robot, demo_folder, folder, program):
             yield Cell(node, domain, robot)
             assert node.end() in (0, 4), node.text()
             report = node.report()
-            assert report["dropped"] == [0, 0] and report["unrecorded"] == 0, report
+            # states of the arm take no network to the node
+            assert report["lost"] == report["dropped"] == [0, 0] and report["unrecorded"] == 0, report
 
 
 # ur-rtde is installed for it by the slow proofs
@@ -268,6 +272,21 @@ def test_flagged_holes_are_probed_by_service_and_action(cell):
         return all(any(abs(shown - diameter) < 0.05 for shown in diameters) for diameter in (8.0, 6.0))
 
     cell.wait_for(is_shown)
+
+
+def test_others_see_the_states_of_the_arm_as_pairs_of_pose_and_wrench(cell):
+    kinds = {"pose": PoseStamped, "wrench": WrenchStamped}
+    readers = {name: cell.peer.reader(f"/probe/{name}", kind, BEST_EFFORT) for name, kind in kinds.items()}
+    headers = {name: {} for name in kinds}
+
+    def are_seen():
+        for name, reader in readers.items():
+            messages = [message.header for message in reader.take(1000)]
+            headers[name].update(((header.stamp.sec, header.stamp.nanosec), header.frame_id) for header in messages)
+        return len(headers["pose"].keys() & headers["wrench"].keys()) > 100
+
+    cell.wait_for(are_seen)
+    assert {*headers["pose"].values(), *headers["wrench"].values()} == {"cell", "probe"}
 
 
 def has_touched(cell, feedback, name, least):

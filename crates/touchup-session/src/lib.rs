@@ -11,6 +11,7 @@
 //! | [`calibration`] | tip, payload and pose of the scan: from a recording to scene settings |
 //! | [`input_check`] | findings against a recording on a scan |
 //! | [`refinement`] | refines a scan by a recording, from first message to result |
+//! | [`probing_run`] | probes flagged features with one arm, one after the other |
 //! | [`sweep`] | runs many refinements as jobs, and compares two of them |
 //! | [`session`] | one run: its recording, its result, and the inputs that reproduce it |
 #![cfg_attr(not(test), warn(clippy::unwrap_used))]
@@ -21,6 +22,7 @@ pub mod calibration;
 pub mod clock;
 pub mod input_check;
 pub mod live;
+pub mod probing_run;
 pub mod refinement;
 pub mod replay;
 pub mod scan;

@@ -142,7 +142,7 @@ pub(super) struct Sensor<'a> {
 
 /// Transport of one topic: loss, and time of arrival.
 #[derive(Clone, Copy)]
-struct Wire {
+struct TopicTransport {
     period: f64,
     jitter: f64,
     clock: f64,
@@ -170,19 +170,19 @@ impl<'a> Sensor<'a> {
     /// All messages, in order of arrival.
     pub(super) fn record(mut self, moments: &[TrueState]) -> Vec<Message> {
         let p = self.params;
-        let silent = Wire {
+        let silent = TopicTransport {
             period: 0.0,
             jitter: 0.0,
             clock: 0.0,
             clock_rate: 0.0,
             silent_until: f64::MIN,
         };
-        let mut poses = Wire {
+        let mut poses = TopicTransport {
             period: p.pose_rate.recip(),
             jitter: p.jitter,
             ..silent
         };
-        let mut wrenches = Wire {
+        let mut wrenches = TopicTransport {
             period: p.wrench_rate.recip(),
             jitter: p.jitter / 2.0,
             clock: p.wrench_clock,
@@ -263,7 +263,7 @@ impl<'a> Sensor<'a> {
     }
 
     /// Time of arrival (s) and stamp (ns) of a message; `None` for a lost one.
-    fn send(&mut self, wire: &mut Wire, t: f64) -> Option<(f64, i64)> {
+    fn send(&mut self, wire: &mut TopicTransport, t: f64) -> Option<(f64, i64)> {
         let p = self.params;
         let limit = JITTER_LIMIT * wire.period;
         let jitter = (gauss(&mut self.rng) * wire.jitter).clamp(-limit, limit);

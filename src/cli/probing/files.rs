@@ -109,12 +109,10 @@ impl ProbeFiles {
         self.last_ns = Some(stamp_ns);
         let (pose, wrench) = state.as_probe(stamp_ns);
         let (pose, wrench) = (Message::Pose(pose), Message::Wrench(wrench));
-        self.recording
-            .write(&pose, BASE_FRAME)
-            .map_err(CliError::not_written)?;
-        self.recording
-            .write(&wrench, PROBE_FRAME)
-            .map_err(CliError::not_written)?;
+        for (message, frame) in [(&pose, BASE_FRAME), (&wrench, PROBE_FRAME)] {
+            let written = self.recording.write(message, frame);
+            written.map_err(CliError::not_written)?;
+        }
         if stamp_ns.saturating_sub(self.flushed_ns) > FLUSH_EVERY_NS {
             self.recording.flush().map_err(CliError::not_written)?;
             self.flushed_ns = stamp_ns;

@@ -16,7 +16,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::progress::WorkProgress;
 use super::recorded::RecordedFlags;
-use super::refinement::{RefinementFiles, RefinementResult};
+use super::refinement::{RefineSummary, RefinementFiles, RefinementResult};
 use super::signals::StopSignals;
 use super::told::ToldFlags;
 use super::{CliError, Losses, not_written};
@@ -33,7 +33,8 @@ use touchup_io::mesh_file::{MeshFile, MeshUnit, read_mesh};
 use touchup_io::probed_touches_file::TouchLine;
 use touchup_io::recording::StampSource;
 use touchup_probing::arm::{Arm, ArmState};
-use touchup_probing::execute::{Ending, Flag, FlagResult, Plan, Prober, References, plan};
+use touchup_probing::execute::{Ending, Flag, FlagResult, Plan};
+use touchup_session::probing_run::ProbingRun;
 use touchup_session::refinement::RefinementOptions;
 use world::LiveWorld;
 pub(super) use world::{KeptMeasurements, SpotWorld};
@@ -75,8 +76,9 @@ impl Probing<'_> {
     pub fn planned(&self, ready: &ProbingSetup, now: &ArmState) -> Result<Vec<Plan>, CliError> {
         let _planning = WorkProgress::stage("plan");
         let world = ready.static_world()?;
+        let run = ProbingRun::new(ready.cell.clone());
         let plan_of = |flag: &Flag| {
-            plan(&ready.cell, &ready.params, &world, flag, now, None)
+            run.plan(&ready.params, flag, now, &world)
                 .map_err(|error| CliError::plan(flag.id, error))
         };
         let plans = self
@@ -97,7 +99,6 @@ impl Probing<'_> {
     /// a signal ends it. Surely wrong measurements prevent a mesh, unless forced.
     ///
     /// - `is_resumed`: skips the finished features of the folder.
-    #[expect(clippy::too_many_lines)]
     pub fn done(
         &self,
         ready: &ProbingSetup,
@@ -113,110 +114,83 @@ impl Probing<'_> {
             self.flags,
             ready,
         )?;
-        let mut features = match is_resumed {
-            true => folder.resume(&request)?,
-            false => folder.check_own().map(|()| Vec::new())?,
+        let mut file = ProbedFile {
+            features: match is_resumed {
+                true => folder.resume(&request)?,
+                false => folder.check_own().map(|()| Vec::new())?,
+            },
+            check: Some(CheckOfResults::of(&ready.check)),
         };
         let mut world = LiveWorld::new(ready, self.out, [self.is_simulated, is_resumed], signals)?;
         if !is_resumed {
             folder.begin(&request)?;
         }
-        let (mut probed, mut references) = (Vec::<FlagResult>::new(), References::default());
-        let check = CheckOfResults::of(&ready.check);
+        let probed = self.probed(ready, arm, &mut world, &mut file)?;
+        signals.arm_is_at_rest();
+        let touches = world.finish()?;
+        self.concluded(ready, file.features, probed, touches)
+    }
+
+    /// Probes the flags without a result in `file`, until one is broken off.
+    fn probed(
+        &self,
+        ready: &ProbingSetup,
+        arm: &mut dyn Arm,
+        world: &mut LiveWorld<'_>,
+        file: &mut ProbedFile,
+    ) -> Result<Vec<FlagResult>, CliError> {
+        let (mut run, mut probed) = (
+            ProbingRun::new(ready.cell.clone()),
+            Vec::<FlagResult>::new(),
+        );
         for flag in self.flags {
-            if features.iter().any(|record| record.flag == flag.id) {
+            if file.features.iter().any(|record| record.flag == flag.id) {
                 continue;
             }
-            let prober = Prober::new(arm, &ready.cell, &ready.params, &mut world);
-            let mut prober = prober.beside(references);
-            let one = prober.probe(flag);
-            references = prober.take_references();
-            features.push(ProbedRecord::of(&one, flag));
-            features.sort_by_key(|record| record.flag);
+            let one = run.probe(&ready.params, flag, arm, world);
+            file.features.push(ProbedRecord::of(&one, flag));
+            file.features.sort_by_key(|record| record.flag);
             // on disk at once, whatever comes after it
-            let file = ProbedFile {
-                features,
-                check: Some(check.clone()),
-            };
-            folder.write(&file)?;
-            features = file.features;
+            ProbingFolder { path: self.out }.write(file)?;
             let is_over = matches!(one.ending, Ending::Stopped(_) | Ending::Cancelled(_));
             probed.push(one);
             if is_over {
                 break;
             }
         }
-        signals.arm_is_at_rest();
-        let touches = world.finish()?;
+        Ok(probed)
+    }
+
+    /// Makes the mesh, unless the last probing forbids it, and names the losses.
+    ///
+    /// - `touches`: number of written touches.
+    fn concluded(
+        &self,
+        ready: &ProbingSetup,
+        features: Vec<ProbedRecord>,
+        probed: Vec<FlagResult>,
+        touches: usize,
+    ) -> Result<ProbingOutcome, CliError> {
+        let path = self.out.join(TOUCHES);
+        let places = format!("the touches ({touches}) are in {}", path.display());
         let ended = probed.last().map(|last| &last.ending);
-        let next = match ended {
-            Some(Ending::Cancelled(_)) => Some("--resume goes on"),
-            Some(ending) if ending.is_displaced() && !self.is_forced => {
-                Some("no mesh is made of touches that do not hold together")
+        let (refine, outcome) = match self.without_mesh(&features, ended, &places) {
+            Some(error) => (None, Err(error)),
+            None => {
+                let touched = ProbingFolder { path: self.out }.touches()?;
+                let refined = self.refined(&touched);
+                if refined.is_ok() {
+                    let MeshFile { mesh, .. } =
+                        read_mesh(&self.out.join("refined.ply"), self.unit)?;
+                    let drawn = self.out.join("touches.png");
+                    draw_touches(&mesh, &touched, &probed, self.flags, &drawn)?;
+                }
+                self.outcome(&features, ended, &places, refined)
             }
-            _ => None,
         };
-        if let Some((ending, next)) = ended.zip(next) {
-            let finished = features
-                .iter()
-                .filter(|record| record.is_finished())
-                .count();
-            let error = CliError::ended(ending).with(format_args!(
-                "{finished} of {} features are finished, the touches ({touches}) are in {}; {next}",
-                self.flags.len(),
-                self.out.join(TOUCHES).display()
-            ));
-            let summary = ProbingSummary {
-                check,
-                features,
-                told: ready.told.clone(),
-                refine: None,
-            };
-            return Ok(ProbingOutcome {
-                summary,
-                probed,
-                outcome: Err(error),
-            });
-        }
-        let touched = folder.touches()?;
-        let (refine, mut losses, failed) = match self.refined(&touched) {
-            Ok(RefinementResult {
-                summary, losses, ..
-            }) => (Some(summary), losses, None),
-            Err(error) => (None, Losses::new(), Some(error)),
-        };
-        losses.extend(features.iter().filter_map(ProbedRecord::loss));
-        let not_begun = self.flags.len() - features.len();
-        if not_begun > 0 {
-            losses.push(format!(
-                "{not_begun} of {} flags were not begun",
-                self.flags.len()
-            ));
-        }
-        let outcome = match (ended, failed) {
-            (Some(ending @ Ending::Stopped(_)), failed) => {
-                losses.extend(failed.map(|error| error.message));
-                Err(CliError::ended(ending).with(losses.join("; ")))
-            }
-            (_, Some(failed)) => Err(failed.with(format_args!(
-                "the touches ({touches}) are in {}; --resume --force makes the mesh of them",
-                self.out.join(TOUCHES).display()
-            ))),
-            (_, None) => Ok(losses),
-        };
-        if refine.is_some() {
-            let MeshFile { mesh, .. } = read_mesh(&self.out.join("refined.ply"), self.unit)?;
-            draw_touches(
-                &mesh,
-                &touched,
-                &probed,
-                self.flags,
-                &self.out.join("touches.png"),
-            )?;
-        }
         Ok(ProbingOutcome {
             summary: ProbingSummary {
-                check,
+                check: CheckOfResults::of(&ready.check),
                 features,
                 told: ready.told.clone(),
                 refine,
@@ -225,9 +199,63 @@ impl Probing<'_> {
             outcome,
         })
     }
-}
 
-impl Probing<'_> {
+    /// Reason against a mesh, if any.
+    ///
+    /// - `ended`: ending of the last feature; `places`: of the touches, in words.
+    fn without_mesh(
+        &self,
+        features: &[ProbedRecord],
+        ended: Option<&Ending>,
+        places: &str,
+    ) -> Option<CliError> {
+        let next = match ended? {
+            Ending::Cancelled(_) => "--resume goes on",
+            ending if ending.is_displaced() && !self.is_forced => {
+                "no mesh is made of touches that do not hold together"
+            }
+            _ => return None,
+        };
+        let is_finished = |record: &&ProbedRecord| record.is_finished();
+        let finished = features.iter().filter(is_finished).count();
+        let all = self.flags.len();
+        Some(CliError::ended(ended?).with(format_args!(
+            "{finished} of {all} features are finished, {places}; {next}"
+        )))
+    }
+
+    /// Summary of the mesh, and the unmet requests or the reason of the end.
+    fn outcome(
+        &self,
+        features: &[ProbedRecord],
+        ended: Option<&Ending>,
+        places: &str,
+        refined: Result<RefinementResult, CliError>,
+    ) -> (Option<RefineSummary>, Result<Losses, CliError>) {
+        let (refine, mut losses, failed) = match refined {
+            Ok(RefinementResult {
+                summary, losses, ..
+            }) => (Some(summary), losses, None),
+            Err(error) => (None, Losses::new(), Some(error)),
+        };
+        losses.extend(features.iter().filter_map(ProbedRecord::loss));
+        let (all, not_begun) = (self.flags.len(), self.flags.len() - features.len());
+        if not_begun > 0 {
+            losses.push(format!("{not_begun} of {all} flags were not begun"));
+        }
+        let outcome = match (ended, failed) {
+            (Some(ending @ Ending::Stopped(_)), failed) => {
+                losses.extend(failed.map(|error| error.message));
+                Err(CliError::ended(ending).with(losses.join("; ")))
+            }
+            (_, Some(failed)) => Err(failed.with(format_args!(
+                "{places}; --resume --force makes the mesh of them"
+            ))),
+            (_, None) => Ok(losses),
+        };
+        (refine, outcome)
+    }
+
     /// Makes the mesh of the recording in the folder.
     fn refined(&self, touches: &[TouchLine]) -> Result<RefinementResult, CliError> {
         let (scene, told) = ToldFlags::default().scene(Some(self.scene))?;
@@ -276,20 +304,16 @@ pub(super) fn flag_of(id: u32, text: &str, radius: f64) -> Result<Flag, CliError
     let wrong = || CliError::usage(format!("--feature {text} is not {FORM}"));
     let (name, numbers) = text.split_once('@').ok_or_else(wrong)?;
     let kind = FeatureKind::of_name(name);
-    match metres(numbers).ok_or_else(wrong)?[..] {
-        _ if kind.is_none() && name != "unknown" => Err(wrong()),
-        [x, y, z] => Ok(Flag {
-            id,
-            kind,
-            place: Point3::new(x, y, z),
-            radius,
-        }),
-        [x, y, z, radius] if radius > 0.0 => Ok(Flag {
-            id,
-            kind,
-            place: Point3::new(x, y, z),
-            radius,
-        }),
-        _ => Err(wrong()),
-    }
+    let (place, radius) = match metres(numbers).ok_or_else(wrong)?[..] {
+        _ if kind.is_none() && name != "unknown" => return Err(wrong()),
+        [x, y, z] => (Point3::new(x, y, z), radius),
+        [x, y, z, radius] if radius > 0.0 => (Point3::new(x, y, z), radius),
+        _ => return Err(wrong()),
+    };
+    Ok(Flag {
+        id,
+        kind,
+        place,
+        radius,
+    })
 }

@@ -17,14 +17,6 @@ use touchup_session::scan::{Scan, read_scan};
 use touchup_session::scene::{CheckStanding, Scene, simulated_arm};
 use touchup_sim::ArmParams;
 
-/// Current validity of the arm's check; `None` without `robot`.
-fn standing(scene: &Scene) -> Option<CheckStanding> {
-    scene
-        .robot
-        .as_ref()
-        .map(|robot| robot.check_standing(SystemTime::now()))
-}
-
 /// Refuses an impossible cell temperature in `--temperature-c`.
 pub(in crate::cli) fn check_temperature(temperature_c: f64) -> Result<(), CliError> {
     let is_allowed = (-50.0..=100.0).contains(&temperature_c);
@@ -60,7 +52,8 @@ impl ProbingSetup {
         let (cell, params) = scene.probing().ok_or_else(|| CliError::usage(NO_ROBOT))?;
         let Scan { mesh, repair, .. } = read_scan(scan, unit)?;
         info!(%repair, "scan");
-        let check = standing(&scene).ok_or_else(|| CliError::usage(NO_ROBOT))?;
+        let check = scene.check_standing(SystemTime::now());
+        let check = check.ok_or_else(|| CliError::usage(NO_ROBOT))?;
         Ok(Self {
             cell,
             params,
@@ -90,7 +83,8 @@ impl ProbingSetup {
             .robot
             .iter_mut()
             .for_each(|robot| robot.temperature_c = Some(temperature_c));
-        self.check = standing(&self.scene).unwrap_or_else(|| self.check.clone());
+        let check = self.scene.check_standing(SystemTime::now());
+        self.check = check.unwrap_or_else(|| self.check.clone());
         Ok(())
     }
 
@@ -133,19 +127,11 @@ impl ProbingSetup {
             .map_or(f64::NAN, |robot| robot.tolerance * 1e3)
     }
 
-    /// Whether the scene allows motion.
-    pub fn is_motion_allowed(&self) -> bool {
-        self.scene
-            .robot
-            .as_ref()
-            .is_some_and(|robot| robot.allow_motion)
-    }
-
     /// Refuses to move unless the scene allows it.
     ///
     /// # Errors
     /// [`CliError::usage`]
     pub fn may_move(&self) -> Result<(), CliError> {
-        require(self.is_motion_allowed(), NO_MOTION)
+        require(self.scene.allows_motion(), NO_MOTION)
     }
 }

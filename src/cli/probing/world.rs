@@ -19,32 +19,24 @@ use touchup_io::static_poses::{StaticPoseLog, static_pose_line};
 use touchup_method::stylus::{Message, Sample, StampedPose, WrenchFrame};
 use touchup_probing::arm::{ArmState, Observer, StopRequest};
 use touchup_probing::execute::{ProbedTouch, Progress, StaticWorld, World};
-use touchup_session::live::{Engine, Gate, LiveError, Pace, Renewal};
+use touchup_session::live::{LiveError, Pace};
+use touchup_session::refinement::{Refinement, RefinementInput, RefinementOptions};
+use touchup_session::scene::RegionCut;
 use touchup_session::threads::Threads;
-
-/// Room reserved for new faces.
-const ROOM: usize = 1 << 16;
 
 /// Renewal period of the mesh, which the arm reads only before each touch: 200 ms, in ns.
 const EVERY_NS: i64 = 200_000_000;
 
 /// Mesh that follows the samples.
 struct FollowingMesh {
-    engine: Engine,
+    refinement: Refinement,
     /// Pose of the base in the frame of the scan.
     pose_ob: Isometry3<f64>,
     pose: Option<StampedPose>,
-    failed: Option<LiveError>,
 }
 
 impl FollowingMesh {
     fn new(ready: &ProbingSetup, is_simulated: bool) -> Result<Self, CliError> {
-        let nothing =
-            || CliError::usage("the scene says `refine: off`, so nothing would move the mesh");
-        let params = ready
-            .scene
-            .refine_params(WrenchFrame::Sensor)
-            .ok_or_else(nothing)?;
         // a simulated arm behaves independently of the computer's speed; a real one moves on
         // meanwhile
         let pace = Pace {
@@ -52,44 +44,43 @@ impl FollowingMesh {
             every_ns: EVERY_NS,
             ..Pace::default()
         };
-        let scan = Arc::new((ready.mesh.clone(), FaceTree::new_by(&ready.mesh, &Threads)));
-        let renewal = Renewal::Beside {
-            scan,
-            pace,
-            room: ROOM,
-            gate: Gate::default(),
+        // the arm keeps clear of all of the scan, and not only of a region of it
+        let input = RefinementInput {
+            scene: ready.scene.clone(),
+            scan: Arc::new((ready.mesh.clone(), FaceTree::new_by(&ready.mesh, &Threads))),
+            cut: RegionCut::default(),
         };
-        let engine = Engine::new(
-            ready.mesh.clone(),
-            params,
-            ready.scene.patcher_params(),
-            renewal,
-        )?;
+        let options = RefinementOptions {
+            live: Some(pace),
+            ..RefinementOptions::default()
+        };
         Ok(Self {
-            engine,
+            refinement: Refinement::new(input, WrenchFrame::Sensor, options)?,
             pose_ob: ready.cell.pose_bo.inverse(),
             pose: None,
-            failed: None,
         })
     }
 
     /// Takes a message; a wrench comes after the pose of the same state.
-    fn take(&mut self, message: &Message) {
+    fn take(&mut self, message: &Message) -> Result<(), LiveError> {
         let wrench = match message {
-            Message::Pose(pose) => return self.pose = Some(*pose),
+            Message::Pose(pose) => {
+                self.pose = Some(*pose);
+                return Ok(());
+            }
             Message::Wrench(wrench) => wrench,
         };
         let Some(pose) = self.pose.filter(|pose| pose.stamp_ns == wrench.stamp_ns) else {
-            return;
+            return Ok(());
         };
         let sample = Sample {
             stamp_ns: wrench.stamp_ns,
             pose_ot: self.pose_ob * pose.pose_ot,
             wrench: wrench.wrench,
         };
-        match self.engine.push(&sample) {
-            Ok(_) | Err(LiveError::Refine(_)) => {}
-            Err(error) => self.failed = Some(error),
+        match self.refinement.push(&sample) {
+            Ok(_) | Err(LiveError::Refine(_)) => Ok(()),
+            Err(error) => Err(error),
         }
     }
 }
@@ -103,14 +94,14 @@ struct ProbingRecorder {
 
 impl TakeStates for ProbingRecorder {
     fn take_state(&mut self, state: &ArmState) -> bool {
-        match self.files.record(state) {
-            Ok(messages) => messages
-                .iter()
-                .flatten()
-                .for_each(|message| self.mesh.take(message)),
-            Err(error) => self.failed = Some(error),
+        let taken = self.files.record(state).and_then(|messages| {
+            let mut messages = messages.iter().flatten();
+            Ok(messages.try_for_each(|message| self.mesh.take(message))?)
+        });
+        if let Err(error) = taken {
+            self.failed.get_or_insert(error);
         }
-        self.failed.is_none() && self.mesh.failed.is_none()
+        self.failed.is_none()
     }
 }
 
@@ -133,7 +124,8 @@ impl<'a> LiveWorld<'a> {
         let mut mesh = FollowingMesh::new(ready, is_simulated)?;
         let ball_radius = ready.params.pattern.ball_radius;
         let files = match is_resumed {
-            true => ProbeFiles::resume(out, ball_radius, &mut |message| mesh.take(message))?,
+            // a fault of the mesh shows again at the next state
+            true => ProbeFiles::resume(out, ball_radius, &mut |message| _ = mesh.take(message))?,
             false => ProbeFiles::begin(out, ball_radius)?,
         };
         let followed = Follower::new(
@@ -159,20 +151,15 @@ impl<'a> LiveWorld<'a> {
     /// Ends the recording; returns the number of written touches.
     pub fn finish(self) -> Result<usize, CliError> {
         let is_behind = self.followed.is_behind();
-        let ProbingRecorder {
-            mesh,
-            files,
-            failed,
-        } = self.followed.into_inner();
+        let ProbingRecorder { files, failed, .. } = self.followed.into_inner();
         let written = files.finish();
-        match (failed, mesh.failed) {
-            (Some(error), _) => Err(error),
-            (None, Some(error)) => Err(error.into()),
-            (None, None) if is_behind => Err(CliError::arm(format_args!(
+        match failed {
+            Some(error) => Err(error),
+            None if is_behind => Err(CliError::arm(format_args!(
                 "files and mesh were {QUEUE} states behind the arm, so it was stopped: end what else runs on this machine, or \
                  write to a faster disk"
             ))),
-            (None, None) => written,
+            None => written,
         }
     }
 }
@@ -192,16 +179,12 @@ impl Observer for LiveWorld<'_> {
 
 impl World for LiveWorld<'_> {
     fn mesh(&self) -> &TriMesh {
-        self.followed.get().mesh.engine.refiner().mesh()
+        self.followed.get().mesh.refinement.mesh()
     }
 
     fn closest_face(&self, place: &Point3<f64>, reach: f64) -> Option<FaceHit> {
-        self.followed
-            .get()
-            .mesh
-            .engine
-            .refiner()
-            .closest_face(place, reach)
+        let mesh = &self.followed.get().mesh;
+        mesh.refinement.closest_face(place, reach)
     }
 
     fn publish(&mut self, progress: &Progress) {
@@ -227,7 +210,9 @@ impl World for LiveWorld<'_> {
 pub(in crate::cli) struct SpotWorld<'a> {
     scan: StaticWorld,
     signals: &'a StopSignals,
-    log: MeasurementLog,
+    kept: KeptMeasurements<'a>,
+    touch_log: Option<TouchLog>,
+    segment_log: Option<StaticPoseLog>,
     /// Lines of the measurements, in order, without curves.
     made: Vec<String>,
     /// Radius of the ball, m.
@@ -244,56 +229,31 @@ pub(in crate::cli) enum KeptMeasurements<'a> {
     Segments(Option<&'a Path>),
 }
 
-/// Open log of the measurements, if any.
-enum MeasurementLog {
-    Touches(Option<TouchLog>),
-    Segments(Option<StaticPoseLog>),
-}
-
-impl MeasurementLog {
-    fn create(kept: KeptMeasurements, ball_radius: f64) -> Result<Self, CliError> {
-        Ok(match kept {
-            KeptMeasurements::Touches(path) => {
-                let create =
-                    |path: &Path| TouchLog::create(path, ball_radius).map_err(not_written(path));
-                Self::Touches(path.map(create).transpose()?)
-            }
-            KeptMeasurements::Segments(path) => {
-                let create = |path: &Path| StaticPoseLog::create(path).map_err(not_written(path));
-                Self::Segments(path.map(create).transpose()?)
-            }
-        })
-    }
-
-    fn path(&self) -> Option<&Path> {
-        match self {
-            Self::Touches(log) => log.as_ref().map(TouchLog::path),
-            Self::Segments(log) => log.as_ref().map(StaticPoseLog::path),
-        }
-    }
-
-    /// Plural of the measurements, and the flag of their output file.
-    fn names(&self) -> [&'static str; 2] {
-        match self {
-            Self::Touches(_) => ["touches", "--touches-out"],
-            Self::Segments(_) => ["static segments", "--segments-out"],
-        }
-    }
-}
-
 impl<'a> SpotWorld<'a> {
     /// - `kept`: kind of the measurements, and the file for their immediate output.
     pub fn new(
         ready: &ProbingSetup,
-        kept: KeptMeasurements,
+        kept: KeptMeasurements<'a>,
         signals: &'a StopSignals,
     ) -> Result<Self, CliError> {
         let ball_radius = ready.params.pattern.ball_radius;
-        let log = MeasurementLog::create(kept, ball_radius)?;
+        let (mut touch_log, mut segment_log) = (None, None);
+        match kept {
+            KeptMeasurements::Touches(Some(path)) => {
+                let log = TouchLog::create(path, ball_radius);
+                touch_log = Some(log.map_err(not_written(path))?);
+            }
+            KeptMeasurements::Segments(Some(path)) => {
+                segment_log = Some(StaticPoseLog::create(path).map_err(not_written(path))?);
+            }
+            KeptMeasurements::Touches(None) | KeptMeasurements::Segments(None) => {}
+        }
         Ok(Self {
             scan: ready.static_world()?,
             signals,
-            log,
+            kept,
+            touch_log,
+            segment_log,
             made: Vec::new(),
             ball_radius,
             failed: None,
@@ -304,8 +264,11 @@ impl<'a> SpotWorld<'a> {
     /// them.
     pub fn finish<T>(self, measured: Result<T, CliError>) -> Result<T, CliError> {
         let measured = self.failed.map_or(measured, Err);
-        let [what, flag] = self.log.names();
-        measured.map_err(|error| match (self.made.len(), self.log.path()) {
+        let (what, flag, path) = match self.kept {
+            KeptMeasurements::Touches(path) => ("touches", "--touches-out", path),
+            KeptMeasurements::Segments(path) => ("static segments", "--segments-out", path),
+        };
+        measured.map_err(|error| match (self.made.len(), path) {
             (0, _) => error,
             (count, Some(path)) => error.with(format_args!(
                 "the {what} ({count}) are in {}",
@@ -348,11 +311,10 @@ impl World for SpotWorld<'_> {
     fn touched(&mut self, flag: u32, touch: &ProbedTouch) {
         self.made
             .push(TouchLine::of(flag, self.made.len(), touch, self.ball_radius, 0).to_string());
-        let MeasurementLog::Touches(Some(log)) = &mut self.log else {
-            return;
-        };
         // no recording with another clock
-        if let Err(error) = log.append(flag, touch, 0) {
+        if let Some(log) = &mut self.touch_log
+            && let Err(error) = log.append(flag, touch, 0)
+        {
             self.failed = Some(not_written(log.path())(error));
         }
     }
@@ -360,10 +322,9 @@ impl World for SpotWorld<'_> {
     fn weighed(&mut self, segment: &StaticPose) {
         self.made
             .push(static_pose_line(&segment.r_wt, &segment.wrench));
-        let MeasurementLog::Segments(Some(log)) = &mut self.log else {
-            return;
-        };
-        if let Err(error) = log.append(&segment.r_wt, &segment.wrench) {
+        if let Some(log) = &mut self.segment_log
+            && let Err(error) = log.append(&segment.r_wt, &segment.wrench)
+        {
             self.failed = Some(not_written(log.path())(error));
         }
     }

@@ -6,13 +6,13 @@ use std::collections::BTreeMap;
 
 /// Names of types with two definitions or more.
 const HOMONYMS: Bound = Bound {
-    today: 61,
+    today: 60,
     wanted: 15,
 };
 
 /// Types that are named by no noun.
 const NO_NOUNS: Bound = Bound {
-    today: 127,
+    today: 125,
     wanted: 0,
 };
 

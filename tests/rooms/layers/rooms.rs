@@ -36,6 +36,7 @@ pub const MAY_USE: &[(&str, &str)] = &[
         "scene",
         "parameters stylus mesh reconstruct haptic diagnose plan arm execute sim io",
     ),
+    ("probing_run", "plan arm execute"),
     ("replay", "numeric stylus io scene"),
     (
         "session",
@@ -74,7 +75,7 @@ pub const MAY_USE: &[(&str, &str)] = &[
     ),
     (
         "node",
-        "clock stylus mesh reconstruct haptic live form features plan arm execute sim diagnose io scan scene session \
+        "clock stylus mesh reconstruct haptic live form features plan arm execute sim diagnose io scan scene session probing_run refinement \
          threads ros",
     ),
     (
@@ -86,7 +87,7 @@ pub const MAY_USE: &[(&str, &str)] = &[
     (
         "cli",
         "clock numeric stylus mesh reconstruct haptic live features conformity plan arm execute sim align \
-         calibrate compare diagnose io threads scan scene session replay refinement sweep document inspect input_check calibration ros \
+         calibrate compare diagnose io threads scan scene session probing_run replay refinement sweep document inspect input_check calibration ros \
          node page ros2_control ur",
     ),
 ];

@@ -11,7 +11,6 @@ use super::channels::{FeatureInput, ViewInput};
 use super::error::NodeError;
 use super::feature_messages::kind_of;
 use super::refinement::RefinementWorker;
-use super::replica::MeshVersion;
 use super::session::ResultFiles;
 use super::take_out::BUSY;
 use crate::ros::convert::{header, point_of, stamp_ns, trigger};
@@ -267,9 +266,8 @@ impl RefinementWorker {
         };
         self.side_work.begin("ending", end)?;
         self.fault = None;
-        let replica = Box::new(MeshVersion::of(&self.setup.scan.0, &name));
         // both receivers take these despite any backlog
-        let _ = self.view.send(ViewInput::Session(replica));
+        let _ = self.view.send(ViewInput::Session(name.clone()));
         self.setup.shared.mesh.announce_session();
         let _ = self.features.send(FeatureInput::Session(name.clone()));
         Ok(name)
@@ -360,7 +358,6 @@ impl RefinementWorker {
             .map_err(|why| why.to_string())?;
         self.mismatch_rate_hz = parameters.double("mismatch_rate_hz");
         self.setup.shared.set_parameters(parameters);
-        self.setup.shared.offer(&self.view, ViewInput::Parameters);
         Ok(())
     }
 

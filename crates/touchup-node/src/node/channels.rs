@@ -1,16 +1,14 @@
 //! Messages between the workers.
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
 use std::sync::mpsc::SyncSender;
 
 use nalgebra::Point3;
 
-use super::replica::{Edits, MeshVersion};
-use super::variances::Variances;
+use super::variances::VertexVariance;
+use crate::ros::mesh_feed::Edits;
 use crate::ros::messages::{
-    DetectFeaturesRequest, DetectFeaturesResponse, DiagnosticArray, FeatureArray,
-    FlagFeatureResponse, UnflagFeatureResponse,
+    DetectFeaturesRequest, DetectFeaturesResponse, FlagFeatureResponse, UnflagFeatureResponse,
 };
 use crate::ros::port::Reply;
 use touchup_features::features::Feature;
@@ -22,22 +20,16 @@ use touchup_session::live::TouchDelta;
 pub enum ViewInput {
     /// a change of the mesh
     Edits(Box<Edits>),
-    /// variances of vertices
-    Variances(Variances),
-    /// a new session
-    Session(Box<MeshVersion>),
+    /// version of the mesh with these variances of vertices
+    Variances(u64, Vec<VertexVariance>),
+    /// name of a new session
+    Session(String),
     /// a touched face and its signed distance, m; only with tiles coloured by mismatch
     Mismatch(u32, f64),
     /// position of the tip
     Tip(LastTip),
-    /// all features, and the next touches by hand
-    Features(Arc<FeatureArray>, NextTouches),
     /// a request for the whole state on the topic
     Resync,
-    /// diagnostics, once a second
-    Diagnostics(Box<DiagnosticArray>),
-    /// a changed parameter
-    Parameters,
 }
 
 /// Last position of the tip.

@@ -6,13 +6,12 @@ use std::time::{Duration, Instant};
 use tracing::{info, warn};
 
 use super::acceptance::{SampleVerdict, is_of_pairing, meaning};
-use super::channels::ViewInput;
 use super::error::NodeError;
 use super::refinement::RefinementWorker;
 use super::session::{NodeEnd, SessionReport};
 use crate::ros::convert::header;
 use crate::ros::messages::{DiagnosticArray, DiagnosticStatus, KeyValue};
-use crate::ros::port::Endpoint;
+use crate::ros::port::{Endpoint, Publication};
 use touchup_session::live::{Latencies, Quantiles};
 use touchup_session::session::RecordingLoss;
 
@@ -259,9 +258,7 @@ impl RefinementWorker {
             header: header(self.port.now_ns(), ""),
             status,
         };
-        self.setup
-            .shared
-            .offer(&self.view, ViewInput::Diagnostics(Box::new(message)));
+        self.port.publish(Publication::Diagnostics(message));
     }
 
     fn numbers(&self, report: &SessionReport) -> Vec<KeyValue> {

@@ -53,7 +53,7 @@ impl InputDoubts {
         (self.looked, self.accepted) = (now, accepted);
         let (monitor, scan, found) = (
             monitor.clone(),
-            Arc::clone(&setup.scan),
+            Arc::clone(&setup.input.scan),
             Arc::clone(&self.found),
         );
         let look = move || {

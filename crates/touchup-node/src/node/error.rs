@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use touchup_method::haptic::RefineError;
 use touchup_method::stylus::SettingError;
 use touchup_session::live::LiveError;
+use touchup_session::refinement::RefinementError;
 use touchup_session::scan::ScanError;
 use touchup_session::scene::SceneError;
 use touchup_session::session::{OutcomeError, SessionError};
@@ -26,9 +27,9 @@ pub enum NodeError {
     /// The scene is unusable.
     #[error(transparent)]
     Scene(#[from] Box<SceneError>),
-    /// The scene says `refine: off`.
-    #[error("the scene says `refine: off`, so nothing would move the mesh: take that out of it")]
-    NothingMoves,
+    /// The refinement of the scan does not start.
+    #[error(transparent)]
+    Refinement(#[from] Box<RefinementError>),
     /// The scene has no `robot`.
     #[error(
         "robot:= needs `robot:` in the scene: nobody knows where the arm stands and what it must never leave (config/probe.yaml is an example)"

@@ -12,7 +12,7 @@ use tracing::warn;
 
 use super::channels::ViewInput;
 use super::refinement::RefinementWorker;
-use super::variances::{VarianceState, Variances, VertexVariance, evaluated};
+use super::variances::{VarianceState, VertexVariance, evaluated};
 
 /// Time without samples after which the variances are computed: longer than the node takes to
 /// settle the mesh.
@@ -92,7 +92,7 @@ impl RefinementWorker {
             let known = places
                 .iter()
                 .map(|&(vertex, ..)| mesh.variance(vertex).to_bits());
-            let variances = evaluated(&mut patcher, &setup.scan, &places)
+            let variances = evaluated(&mut patcher, &setup.input.scan, &places)
                 .into_iter()
                 .zip(known);
             let changed = variances.filter(|((_, variance), known)| variance.to_bits() != *known);
@@ -117,7 +117,7 @@ impl RefinementWorker {
         // a busy view gets them with the next computation
         if self
             .view
-            .try_send(ViewInput::Variances(Variances { version, of }))
+            .try_send(ViewInput::Variances(version, of))
             .is_ok()
         {
             (self.session.version, self.session.sent_version) = (version, version);

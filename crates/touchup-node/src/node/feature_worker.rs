@@ -2,13 +2,13 @@
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender};
+use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
 use nalgebra::Vector3;
 
-use super::channels::{ArmMeasurement, FeatureInput, NextTouches, ViewInput};
-use super::feature_messages::{flagged, found, related};
+use super::channels::{ArmMeasurement, FeatureInput, NextTouches};
+use super::feature_messages::{flagged, found, markers, related};
 use super::shared::SharedNodeState;
 use crate::ros::convert::header;
 use crate::ros::messages::{
@@ -16,6 +16,7 @@ use crate::ros::messages::{
     FlagFeatureResponse, UnflagFeatureResponse,
 };
 use crate::ros::parameters::KIND_NAMES;
+use crate::ros::port::{Port, Publication};
 use touchup_features::features::{Feature, FeatureKind, Tracker, relations};
 use touchup_geometry::mesh::MeshError;
 use touchup_method::stylus::ProbedPoint;
@@ -37,8 +38,8 @@ const SNAPSHOT_WAIT: Duration = Duration::from_secs(10);
 /// State of the feature thread.
 pub struct FeatureWorker {
     clock: Clock,
+    port: Arc<dyn Port>,
     shared: Arc<SharedNodeState>,
-    view: SyncSender<ViewInput>,
     session: String,
     tracker: Tracker,
     touches: Vec<ProbedPoint>,
@@ -64,15 +65,15 @@ impl FeatureWorker {
     /// Before the first input.
     pub fn new(
         clock: Clock,
+        port: Arc<dyn Port>,
         shared: Arc<SharedNodeState>,
-        view: SyncSender<ViewInput>,
         session: String,
     ) -> Self {
         let now = clock.now();
         Self {
             clock,
+            port,
             shared,
-            view,
             session,
             tracker: Tracker::new(),
             touches: Vec::new(),
@@ -131,8 +132,8 @@ impl FeatureWorker {
             FeatureInput::Session(session) => {
                 *self = Self::new(
                     self.clock.clone(),
+                    Arc::clone(&self.port),
                     Arc::clone(&self.shared),
-                    self.view.clone(),
                     session,
                 );
             }
@@ -437,11 +438,11 @@ impl FeatureWorker {
     }
 
     fn publish(&self) {
-        // the view takes it without much delay, and shows it even when late
-        let _ = self.view.send(ViewInput::Features(
-            Arc::new(self.features()),
-            self.next_touches(),
-        ));
+        let features = self.features();
+        self.port.publish(Publication::Features(features.clone()));
+        self.port
+            .publish(Publication::FeatureMarkers(markers(&features)));
+        self.shared.set_features(features, self.next_touches());
     }
 
     /// The next touch by hand for each feature; for a flag its position.

@@ -8,10 +8,10 @@ use nalgebra::{Point3, Vector3};
 
 use super::channels::{FeatureInput, LastTip, ViewInput};
 use super::refinement::RefinementWorker;
-use super::replica::Edits;
 use super::tiles::ColourBy;
 use super::view::colour_by;
 use crate::ros::convert::{header, point, vector};
+use crate::ros::mesh_feed::Edits;
 use crate::ros::messages::HapticMismatch;
 use crate::ros::port::Publication;
 use touchup_method::haptic::{Case, Mismatch, Update};
@@ -90,7 +90,7 @@ impl RefinementWorker {
 
     fn publish_tip(&self, stamp_ns: i64, centre: Point3<f64>) {
         let refiner = self.session.engine.refiner();
-        let radius = self.setup.scene.tip_params().radius;
+        let radius = self.setup.input.scene.tip_params().radius;
         let closest = refiner.closest_face(&centre, TIP_REACH).map(|hit| {
             let off: Vector3<f64> = centre - hit.point;
             let side = if off.dot(&refiner.mesh().normal(hit.face)) < 0.0 {
@@ -112,12 +112,12 @@ impl RefinementWorker {
     /// Sends mesh changes, as far as the view has taken earlier ones.
     pub(super) fn send_edits(&mut self) {
         let is_idle = self.setup.clock.since(self.sampled) >= TORN_AFTER;
-        while let Some(edits) = self.unsent.take().or_else(|| self.filled(is_idle)) {
+        while let Some(edits) = self.next_edits(is_idle) {
             let complete = edits.is_complete.then_some(edits.version);
             if let Err(TrySendError::Full(ViewInput::Edits(back))) =
                 self.view.try_send(ViewInput::Edits(edits))
             {
-                self.unsent = Some(back);
+                self.edits = Some(back);
                 return;
             }
             complete
@@ -126,23 +126,27 @@ impl RefinementWorker {
         }
     }
 
-    /// The next changes, if a free list is here and there are changes.
-    fn filled(&mut self, is_idle: bool) -> Option<Box<Edits>> {
+    /// The changes refused by a full view, or the next ones, if a free list is here and there are
+    /// changes.
+    fn next_edits(&mut self, is_idle: bool) -> Option<Box<Edits>> {
+        if let Some(refused) = self.edits.take_if(|edits| edits.is_filled()) {
+            return Some(refused);
+        }
         let edits_now = self.session.engine.edits();
         let is_sent = self.session.sent_version == self.session.version
             && self.session.sent_edits == edits_now;
         if is_sent {
             return None;
         }
-        let mut edits = self.kept.take().or_else(|| self.spare.try_recv().ok())?;
+        let mut edits = self.edits.take().or_else(|| self.spare.try_recv().ok())?;
         let stamp_ns = self.session.last_ns.unwrap_or(0);
-        let (scan, version) = (&self.setup.scan.0, self.session.version);
+        let (scan, version) = (&self.setup.input.scan.0, self.session.version);
         if let Err(error) = edits.fill(&mut self.session.engine, scan, version, stamp_ns, is_idle) {
             self.fail(&error);
             return None;
         }
-        if edits.is_empty() && !edits.is_complete {
-            self.kept = Some(edits);
+        if !edits.is_filled() {
+            self.edits = Some(edits);
             return None;
         }
         if edits.is_complete {

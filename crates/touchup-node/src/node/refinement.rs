@@ -15,7 +15,6 @@ use super::channels::{FeatureInput, ViewInput};
 use super::doubts::InputDoubts;
 use super::error::NodeError;
 use super::frame_resolver::{FrameNames, FrameResolver, Refusal};
-use super::replica::Edits;
 use super::session::{NodeEnd, NodeSession};
 use super::setup::Setup;
 use super::side_work::SideWork;
@@ -24,14 +23,15 @@ use super::take_out::TakingOut;
 use super::variances::VarianceWork;
 use crate::ros::convert::{as_pose, frame_transform, stamp_ns};
 use crate::ros::inbox::Arrivals;
+use crate::ros::mesh_feed::Edits;
 use crate::ros::messages::{PoseStamped, TFMessage, WrenchStamped};
 use crate::ros::port::{Arrival, Endpoint, Port};
 use crate::ros::stop::StopState;
-use touchup_method::haptic::RefineError;
 use touchup_method::stylus::{
     FrameError, FrameTransform, Message, MovingFrame, Sample, WrenchFrame,
 };
 use touchup_session::live::LiveError;
+use touchup_session::refinement::reason_of_refusal;
 
 /// Period of stream checks without messages.
 const IDLE: Duration = Duration::from_millis(10);
@@ -80,10 +80,8 @@ pub struct RefinementWorker {
     pub(super) spare: Receiver<Box<Edits>>,
     /// handle of the arm, if any
     pub(super) arm: Option<ArmHandle>,
-    /// filled changes refused by a full view
-    pub(super) unsent: Option<Box<Edits>>,
-    /// changes to fill again
-    pub(super) kept: Option<Box<Edits>>,
+    /// changes refused by a full view, or a list to fill
+    pub(super) edits: Option<Box<Edits>>,
     pub(super) resolver: FrameResolver,
     /// frame whose transforms give the pose of the stylus, if any
     pub(super) moving: Option<MovingFrame>,
@@ -152,7 +150,7 @@ impl RefinementWorker {
                     tool,
                     sensor,
                 },
-                setup.scene.placement(),
+                setup.input.scene.placement(),
             ),
             setup,
             port,
@@ -160,8 +158,7 @@ impl RefinementWorker {
             features,
             spare,
             arm: None,
-            unsent: None,
-            kept: None,
+            edits: None,
             session,
             waiting: Default::default(),
             streams: [StreamWatch::new(now), StreamWatch::new(now)],
@@ -417,7 +414,9 @@ impl RefinementWorker {
                     Err(error) => self.fail(&error),
                 }
             }
-            Err(LiveError::Refine(error)) => self.session.counters.refuse(reason_of(&error)),
+            Err(error @ LiveError::Refine(_)) => {
+                self.session.counters.refuse(reason_of_refusal(&error));
+            }
             Err(error) => self.fail(&error),
         }
     }
@@ -496,7 +495,7 @@ impl RefinementWorker {
         // changes of the previous session do not apply to this one
         self.doubts.restart();
         self.give_up_taking_out("a new session has begun");
-        self.kept = self.unsent.take().or(self.kept.take());
+        self.edits.iter_mut().for_each(|edits| edits.clear());
         std::mem::replace(&mut self.session, next)
     }
 }
@@ -507,14 +506,4 @@ fn shifted(mut message: Message, shift_ns: i64) -> Message {
         Message::Wrench(wrench) => wrench.stamp_ns = wrench.stamp_ns.saturating_add(shift_ns),
     }
     message
-}
-
-/// Refusal reason of an error. The synchroniser passes only checked samples, in order of time: the
-/// remaining cause is a step with a non-finite result.
-fn reason_of(error: &RefineError) -> &'static str {
-    match error {
-        RefineError::Sample(_) => "sample",
-        RefineError::Setting(_) | RefineError::Dynamics(_) => "dynamics",
-        RefineError::Mesh(_) | RefineError::NoSuchFace { .. } => "mesh",
-    }
 }

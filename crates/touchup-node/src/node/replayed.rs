@@ -90,8 +90,8 @@ impl RefinementWorker {
         let source = EvidenceSource {
             recording,
             topics,
-            placement: self.setup.scene.placement(),
-            sync: self.setup.scene.sync_params(),
+            placement: self.setup.input.scene.placement(),
+            sync: self.setup.input.scene.sync_params(),
             until_ns: removal.after_ns,
         };
         let evidence = source

@@ -9,15 +9,13 @@ use super::arm::{self, ArmOfNode};
 use super::error::NodeError;
 use super::feature_worker::FeatureWorker;
 use super::keeping::ReplayedSession;
-use super::mesh_patches::MeshPatches;
 use super::refinement::RefinementWorker;
-use super::replica::Edits;
 use super::session::{NodeEnd, NodeSession};
 use super::setup::Setup;
 use super::side_work::{begin, begin_behind};
 use super::view::ViewWorker;
 use crate::ros::inbox::Arrivals;
-use crate::ros::messages::MeshPatch;
+use crate::ros::mesh_feed::{Edits, MeshFeed};
 use crate::ros::parameters::{ParameterValue, Parameters};
 use crate::ros::port::Port;
 use crate::ros::stop::ALLOW_MOTION;
@@ -98,7 +96,7 @@ impl PreparedNode {
 
     /// The scan: its path, and its number of faces.
     pub fn scan(&self) -> (&Path, usize) {
-        (&self.setup.scan_path, self.setup.scan.0.face_count())
+        (&self.setup.scan_path, self.setup.input.scan.0.face_count())
     }
 
     /// Unit of the coordinates in files of meshes.
@@ -106,21 +104,19 @@ impl PreparedNode {
         self.setup.mesh_unit
     }
 
-    /// The mesh before any touch, in parts: the state of a follower present from the beginning.
-    pub fn whole_mesh(&self) -> impl Iterator<Item = MeshPatch> + Send + 'static + use<> {
-        let shared = &self.setup.shared;
-        let (replica, _) = shared.mesh.now();
-        MeshPatches::of(&replica, shared.scan_sigma).whole(replica, shared.frame.clone())
+    /// The mesh, for followers in this process.
+    pub fn mesh_feed(&self) -> Arc<MeshFeed> {
+        Arc::clone(&self.setup.shared.mesh)
     }
 
     /// The scan, or its refined region, with the tree over its faces.
     pub fn scan_mesh(&self) -> Arc<(TriMesh, FaceTree)> {
-        Arc::clone(&self.setup.scan)
+        Arc::clone(&self.setup.input.scan)
     }
 
     /// The scene as read.
     pub fn scene(&self) -> &Scene {
-        &self.setup.scene
+        &self.setup.input.scene
     }
 
     /// Text of the scene.
@@ -148,13 +144,9 @@ impl PreparedNode {
             },
         ];
         let unused = if has_arm { &unused[..2] } else { &unused };
-        let (scan, tree) = &*setup.scan;
-        let memory = Memory::of(
-            session.engine.refiner().footprint(),
-            scan.bytes() + tree.bytes() + setup.cut.bytes(),
-        );
+        let memory = Memory::of(session.engine.refiner().footprint(), setup.input.bytes());
         SceneCost {
-            parts: setup.scene.built(unused, &crate::FEATURES),
+            parts: setup.input.scene.built(unused, &crate::FEATURES),
             memory,
         }
     }
@@ -197,8 +189,8 @@ impl PreparedNode {
         );
         let features = FeatureWorker::new(
             clock.clone(),
+            Arc::clone(&port),
             Arc::clone(&setup.shared),
-            to_view.clone(),
             name,
         );
         let arm = arm

@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::SystemTime;
 
@@ -17,9 +16,7 @@ use crate::ros::port::Port;
 use touchup_features::diagnose::InputMonitor;
 use touchup_io::session_folder::SessionFolder;
 use touchup_method::stylus::{Synchroniser, WrenchFrame};
-use touchup_session::live::{
-    Engine, EngineResult, Gate, Latencies, Pace, Quantiles, Renewal, TouchDelta,
-};
+use touchup_session::live::{Engine, EngineResult, Gate, Latencies, Pace, Quantiles, TouchDelta};
 use touchup_session::session::{
     Outcome, OutcomeError, OutcomePlaces, RecordingLoss, RefinedMesh, SessionRecord,
     SessionRecorder, StrokeChanges,
@@ -216,8 +213,8 @@ impl NodeSession {
             axes,
             sent_version: 1,
             sent_edits: 0,
-            sync: Synchroniser::in_order(setup.scene.sync_params())?,
-            input: InputMonitor::new(setup.scene.input_monitor_params(axes))?,
+            sync: Synchroniser::in_order(setup.input.scene.sync_params())?,
+            input: InputMonitor::new(setup.input.scene.input_monitor_params(axes))?,
             epoch: Epoch::default(),
             counters: Counters::default(),
             pushes: Latencies::new(),
@@ -238,7 +235,7 @@ impl NodeSession {
     /// [`NodeError`]
     pub fn turn_axes(&mut self, setup: &Setup, axes: WrenchFrame) -> Result<(), NodeError> {
         self.engine = engine_of(setup, axes)?;
-        self.input = InputMonitor::new(setup.scene.input_monitor_params(axes))?;
+        self.input = InputMonitor::new(setup.input.scene.input_monitor_params(axes))?;
         self.axes = axes;
         Ok(())
     }
@@ -343,32 +340,13 @@ impl NodeSession {
     }
 }
 
-/// Number of new faces with room reserved in advance.
-const ROOM: usize = 1 << 18;
-
 /// The engine that moves the mesh: the haptic update, with the patch beside it if the scene has
 /// one. No touches yet.
 ///
 /// - `axes`: of the wrenches.
 fn engine_of(setup: &Setup, axes: WrenchFrame) -> Result<Engine, NodeError> {
-    let Setup {
-        scan,
-        scene,
-        cut,
-        clock,
-        ..
-    } = setup;
-    let refine = cut.refine_params(scene.refine_params(axes).ok_or(NodeError::NothingMoves)?);
-    let patch = scene
-        .patcher_params()
-        .map(|params| cut.patcher_params(params));
-    let renewal = Renewal::Beside {
-        scan: Arc::clone(scan),
-        pace: Pace::default(),
-        room: ROOM,
-        gate: Gate::open(clock),
-    };
-    let mut engine = Engine::new(scan.0.clone(), refine, patch, renewal)?;
+    let beside = (Pace::default(), Gate::open(&setup.clock));
+    let mut engine = setup.input.engine(axes, Some(beside)).map_err(Box::new)?;
     engine.watch();
     engine.keep_strokes();
     // the first renewal needs the bounds of the scan, some ms on a large one: no sample should wait
@@ -393,8 +371,8 @@ impl ResultFiles {
     /// # Errors
     /// [`OutcomeError`]
     pub fn write(&self, setup: &Setup, result: EngineResult) -> Result<Outcome, Box<OutcomeError>> {
-        let outside = setup.cut.outside.as_ref();
-        let (mesh, outcome) = RefinedMesh::of(&setup.scan, result, outside, false)?;
+        let outside = setup.input.cut.outside.as_ref();
+        let (mesh, outcome) = RefinedMesh::of(&setup.input.scan, result, outside, false)?;
         let places = OutcomePlaces {
             mesh: &self.mesh,
             unit: setup.mesh_unit,

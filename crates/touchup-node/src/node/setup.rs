@@ -4,28 +4,24 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::error::NodeError;
-use super::replica::MeshReplica;
 use super::shared::SharedNodeState;
+use crate::ros::mesh_feed::MeshFeed;
 use crate::ros::parameters::Parameters;
-use touchup_geometry::mesh::{FaceTree, TriMesh};
 use touchup_io::mesh_file::MeshUnit;
 use touchup_io::recording::Topics;
 use touchup_session::clock::Clock;
+use touchup_session::refinement::RefinementInput;
 use touchup_session::scan::read_scan;
-use touchup_session::scene::{CutScan, RegionCut, Scene, SceneError, Setting};
-
-/// The original scan, and the tree over its faces.
-pub type IndexedScan = Arc<(TriMesh, FaceTree)>;
+use touchup_session::scene::{Scene, SceneError, Setting};
 
 /// Constant data of a running node.
 pub(crate) struct Setup {
     pub clock: Clock,
     pub shared: Arc<SharedNodeState>,
-    pub scan: IndexedScan,
+    /// scene and original scan
+    pub input: RefinementInput,
     pub scan_path: PathBuf,
     pub mesh_unit: MeshUnit,
-    pub scene: Scene,
-    pub cut: RegionCut,
     pub scene_yaml: String,
     pub topics: Topics,
     pub source: &'static str,
@@ -44,11 +40,10 @@ impl Setup {
             path => (PathBuf::from(path), mesh_unit(&parameters)),
         };
         let mesh = read_scan(&scan_path, mesh_unit).map_err(Box::new)?.mesh;
-        if scene.region().is_some() && parameters.string("robot") != "none" {
+        if scene.region().is_some() && parameters.has_arm() {
             return Err(NodeError::RegionWithRobot);
         }
-        let CutScan { mesh, cut } = scene.cut(mesh).map_err(Box::new)?;
-        let tree = FaceTree::new(&mesh);
+        let input = RefinementInput::new(scene, mesh).map_err(Box::new)?;
         let source = if parameters.string("source") == "probe" {
             "probe"
         } else {
@@ -64,17 +59,19 @@ impl Setup {
         let pose_frames = parameters
             .pose_frames()
             .map(|frames| frames.map(str::to_owned));
-        let known = scene.patcher_params().and_then(|params| params.uncertainty);
+        let known = input
+            .scene
+            .patcher_params()
+            .and_then(|params| params.uncertainty);
         let scan_sigma = known.map(|known| known.scan).filter(|sigma| *sigma > 0.0);
-        let replica = MeshReplica::new(clock.clone(), &mesh);
+        let frame = parameters.string("object_frame");
+        let feed = MeshFeed::new(clock.clone(), Arc::clone(&input.scan), frame, scan_sigma);
         Ok(Self {
             clock,
-            shared: Arc::new(SharedNodeState::new(parameters, scan_sigma, replica)),
-            scan: Arc::new((mesh, tree)),
+            shared: Arc::new(SharedNodeState::new(parameters, Arc::new(feed))),
+            input,
             scan_path,
             mesh_unit,
-            scene,
-            cut,
             scene_yaml,
             topics: Topics {
                 pose: format!("/{source}/pose"),

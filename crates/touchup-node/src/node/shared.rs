@@ -4,9 +4,10 @@ use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::mpsc::{SyncSender, TrySendError};
 use std::sync::{Arc, Mutex};
 
-use super::channels::ViewInput;
-use super::replica::MeshReplica;
+use super::channels::{NextTouches, ViewInput};
 use crate::ros::locked;
+use crate::ros::mesh_feed::MeshFeed;
+use crate::ros::messages::FeatureArray;
 use crate::ros::parameters::Parameters;
 
 /// State of the node, readable from all threads.
@@ -14,10 +15,10 @@ use crate::ros::parameters::Parameters;
 pub struct SharedNodeState {
     /// frame of all publications
     pub frame: String,
-    /// standard deviation of the scan, m, if in the scene
-    pub scan_sigma: Option<f64>,
     /// the mesh as sent up to now
-    pub mesh: MeshReplica,
+    pub mesh: Arc<MeshFeed>,
+    /// last published features, and their next touches by hand
+    features: Mutex<Arc<(FeatureArray, NextTouches)>>,
     parameters: Mutex<Arc<Parameters>>,
     /// number of tiles waiting to be sent
     pub tiles_waiting: AtomicUsize,
@@ -31,11 +32,11 @@ pub struct SharedNodeState {
 
 impl SharedNodeState {
     /// Before the first publication.
-    pub fn new(parameters: Parameters, scan_sigma: Option<f64>, mesh: MeshReplica) -> Self {
+    pub fn new(parameters: Parameters, mesh: Arc<MeshFeed>) -> Self {
         Self {
             frame: parameters.string("object_frame").to_owned(),
-            scan_sigma,
             mesh,
+            features: Mutex::default(),
             parameters: Mutex::new(Arc::new(parameters)),
             tiles_waiting: AtomicUsize::new(0),
             dropped_frames: AtomicU64::new(0),
@@ -52,6 +53,16 @@ impl SharedNodeState {
     /// Sets the parameters.
     pub fn set_parameters(&self, parameters: Parameters) {
         *locked(&self.parameters) = Arc::new(parameters);
+    }
+
+    /// The last published features, and their next touches by hand.
+    pub fn features(&self) -> Arc<(FeatureArray, NextTouches)> {
+        Arc::clone(&locked(&self.features))
+    }
+
+    /// Sets the published features.
+    pub fn set_features(&self, features: FeatureArray, next: NextTouches) {
+        *locked(&self.features) = Arc::new((features, next));
     }
 
     /// Sets the number of viewers of the tiles.

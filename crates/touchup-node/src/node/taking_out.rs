@@ -239,8 +239,8 @@ impl RefinementWorker {
             let source = EvidenceSource {
                 recording: &recording,
                 topics: &setup.topics,
-                placement: setup.scene.placement(),
-                sync: setup.scene.sync_params(),
+                placement: setup.input.scene.placement(),
+                sync: setup.input.scene.sync_params(),
                 until_ns,
             };
             let remade = |change| {

@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 
 use nalgebra::{Point3, Vector3};
 
-use super::replica::{FACES_OF_A_TILE, MeshVersion};
 use crate::ros::convert::{header, point};
+use crate::ros::mesh_feed::{FACES_OF_A_TILE, MeshVersion};
 use crate::ros::messages::{ColorRGBA, Marker, Vector3 as Vector3Msg};
 use touchup_method::reconstruct::Support;
 
@@ -76,15 +76,15 @@ pub struct Tiles {
 
 impl Tiles {
     /// Tiles with everything to send.
-    pub fn all_of(replica: &MeshVersion) -> Self {
+    pub fn all_of(mesh: &MeshVersion) -> Self {
         let mut tiles = Self::default();
-        tiles.renew(replica);
+        tiles.renew(mesh);
         tiles
     }
 
     /// Queues all tiles again.
-    pub fn renew(&mut self, replica: &MeshVersion) {
-        (0..replica.slots()[1]
+    pub fn renew(&mut self, mesh: &MeshVersion) {
+        (0..mesh.slots()[1]
             .div_ceil(FACES_OF_A_TILE)
             .max(self.is_drawn.len() as u32))
             .for_each(|tile| self.again.push(tile));
@@ -110,10 +110,10 @@ impl Tiles {
     }
 
     /// Starts another mesh: all tiles are to be sent, and no mismatches are known.
-    pub fn restart(&mut self, replica: &MeshVersion) {
+    pub fn restart(&mut self, mesh: &MeshVersion) {
         self.mismatch.clear();
         self.sent_as.fill(0);
-        self.renew(replica);
+        self.renew(mesh);
     }
 
     /// Queues a changed tile.
@@ -129,12 +129,12 @@ impl Tiles {
     }
 
     /// Notes the signed distance of a touched face, m.
-    pub fn note_mismatch(&mut self, face: u32, distance: f64, replica: &MeshVersion) {
-        if face >= replica.slots()[1] {
+    pub fn note_mismatch(&mut self, face: u32, distance: f64, mesh: &MeshVersion) {
+        if face >= mesh.slots()[1] {
             return;
         }
         if self.mismatch.len() <= face as usize {
-            self.mismatch.resize(replica.slots()[1] as usize, f32::NAN);
+            self.mismatch.resize(mesh.slots()[1] as usize, f32::NAN);
         }
         self.mismatch[face as usize] = distance as f32;
         self.note(face / FACES_OF_A_TILE);
@@ -150,8 +150,8 @@ impl Tiles {
         &mut self,
         most: usize,
         now: Instant,
-        replica: &MeshVersion,
-        (by, frame): (ColourBy, &str),
+        mesh: &MeshVersion,
+        by: ColourBy,
         mut each: impl FnMut(Marker),
     ) {
         for _ in 0..most {
@@ -164,7 +164,7 @@ impl Tiles {
                 self.is_drawn.resize(at + 1, false);
                 self.sent_as.resize(at + 1, 0);
             }
-            let marker = drawn(tile, replica, by, &self.mismatch, frame);
+            let marker = drawn(tile, mesh, by, &self.mismatch);
             let is_empty = marker.points.is_empty();
             let is_repeated = changed.is_none() && self.sent_as[at] > 0;
             if !is_empty || self.is_drawn[at] || is_repeated {
@@ -180,9 +180,9 @@ impl Tiles {
     }
 }
 
-fn drawn(tile: u32, replica: &MeshVersion, by: ColourBy, mismatch: &[f32], frame: &str) -> Marker {
+fn drawn(tile: u32, mesh: &MeshVersion, by: ColourBy, mismatch: &[f32]) -> Marker {
     let mut marker = Marker {
-        header: header(replica.stamp_ns, frame),
+        header: header(mesh.stamp_ns, &mesh.frame),
         ns: NAMESPACE.to_owned(),
         id: tile as i32,
         r#type: Marker::TRIANGLE_LIST,
@@ -201,10 +201,10 @@ fn drawn(tile: u32, replica: &MeshVersion, by: ColourBy, mismatch: &[f32], frame
         ..Marker::default()
     };
     for face in tile * FACES_OF_A_TILE..(tile + 1) * FACES_OF_A_TILE {
-        let Some(corners) = replica.face(face) else {
+        let Some(corners) = mesh.face(face) else {
             continue;
         };
-        let [Some(a), Some(b), Some(c)] = corners.map(|corner| replica.vertex(corner)) else {
+        let [Some(a), Some(b), Some(c)] = corners.map(|corner| mesh.vertex(corner)) else {
             continue;
         };
         let light = light(&[a.0, b.0, c.0]);
@@ -300,12 +300,12 @@ mod tests {
             strip.collect(),
         )
         .unwrap();
-        let replica = MeshVersion::of(&mesh, "test");
-        let mut tiles = Tiles::all_of(&replica);
+        let mesh = MeshVersion::of(&mesh, "object", "test", f32::NAN);
+        let mut tiles = Tiles::all_of(&mesh);
         let mut sent = Vec::new();
         let take = |tiles: &mut Tiles, sent: &mut Vec<u32>| {
-            let how = (ColourBy::Touched, "object");
-            tiles.take(usize::MAX, Instant::now(), &replica, how, |tile| {
+            let how = ColourBy::Touched;
+            tiles.take(usize::MAX, Instant::now(), &mesh, how, |tile| {
                 sent.push(tile.id as u32)
             });
         };
@@ -350,18 +350,18 @@ mod tests {
         .unwrap();
         let first = TriMesh::new(vec![corner(0), corner(1), corner(2)], vec![[0, 1, 2]]).unwrap();
         let [whole, none] = [
-            MeshVersion::of(&mesh, "test"),
-            MeshVersion::of(&first, "test"),
+            MeshVersion::of(&mesh, "object", "test", f32::NAN),
+            MeshVersion::of(&first, "object", "test", f32::NAN),
         ];
         let mut tiles = Tiles::all_of(&whole);
         let begun = Instant::now();
-        let mut at = |seconds: u64, replica: &MeshVersion, changed: &[u32]| {
+        let mut at = |seconds: u64, mesh: &MeshVersion, changed: &[u32]| {
             let now = begun + Duration::from_secs(seconds);
             changed.iter().for_each(|&tile| tiles.note(tile));
             tiles.renew_settled(now);
             let mut sent = Vec::new();
-            let how = (ColourBy::Touched, "object");
-            tiles.take(usize::MAX, now, replica, how, |tile| {
+            let how = ColourBy::Touched;
+            tiles.take(usize::MAX, now, mesh, how, |tile| {
                 sent.push((tile.id, tile.action))
             });
             sent.sort_unstable();

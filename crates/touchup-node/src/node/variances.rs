@@ -10,15 +10,6 @@ use touchup_method::reconstruct::{Patcher, Support};
 /// Number of a vertex, and its variance along the normal, m².
 pub type VertexVariance = (u32, f32);
 
-/// Changed variances of vertices.
-#[derive(Debug)]
-pub struct Variances {
-    /// version of the mesh after this change
-    pub version: u64,
-    /// vertices and variances
-    pub of: Vec<VertexVariance>,
-}
-
 /// Session and version.
 pub type VarianceState = (String, u64);
 

@@ -1,4 +1,4 @@
-//! The view thread: it follows the mesh, and sends tiles, changes, markers and diagnostics at its
+//! The view thread: it writes the feed of the mesh, and sends tiles, changes and tip markers at its
 //! own pace.
 
 use std::sync::Arc;
@@ -6,20 +6,20 @@ use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender};
 use std::time::Duration;
 
-use super::channels::{LastTip, NextTouches, ViewInput};
-use super::feature_messages;
-use super::mesh_patches::MeshPatches;
-use super::replica::Edits;
+use super::channels::{LastTip, ViewInput};
 use super::shared::SharedNodeState;
 use super::tiles::{ColourBy, Tiles};
 use super::tip;
-use crate::ros::messages::{FeatureArray, MeshPatch};
+use crate::ros::mesh_feed::{Edits, MeshFollower};
+use crate::ros::messages::MeshPatch;
 use crate::ros::port::{Port, Publication, TILES_KEPT};
 use touchup_session::clock::Clock;
 
 /// Maximum number of tiles waiting in the port: tiles waiting here are drawn at the time of
 /// sending, changed ones first.
 const TILES_AHEAD: usize = 32;
+/// Maximum number of vertices and faces of one message: 37 kB.
+const OF_A_PART: usize = 1000;
 /// Maximum number of parts of the whole state per period: 2.4 MB.
 const PARTS_AT_ONCE: usize = 64;
 /// Period while there is more to send.
@@ -33,13 +33,12 @@ pub struct ViewWorker {
     /// returns change lists for filling
     spare: SyncSender<Box<Edits>>,
     tiles: Tiles,
-    patches: MeshPatches,
+    /// followers on the topic
+    followers: MeshFollower,
     colour_by: ColourBy,
     whole: Option<Box<dyn Iterator<Item = MeshPatch> + Send>>,
     asked_whole: bool,
     tip: Option<LastTip>,
-    features: Arc<FeatureArray>,
-    next: NextTouches,
 }
 
 impl ViewWorker {
@@ -50,17 +49,14 @@ impl ViewWorker {
         shared: Arc<SharedNodeState>,
         spare: SyncSender<Box<Edits>>,
     ) -> Self {
-        let (replica, _) = shared.mesh.now();
         Self {
             clock,
-            tiles: Tiles::all_of(&replica),
-            patches: MeshPatches::of(&replica, shared.scan_sigma),
+            tiles: Tiles::all_of(&shared.mesh.now().0),
+            followers: shared.mesh.follow_from_now(),
             colour_by: colour_by(&shared),
             whole: None,
             asked_whole: false,
             tip: None,
-            features: Arc::default(),
-            next: NextTouches::new(),
             port,
             shared,
             spare,
@@ -101,7 +97,7 @@ impl ViewWorker {
     fn take(&mut self, input: ViewInput) {
         match input {
             ViewInput::Edits(edits) => {
-                self.patches.note(&edits, &self.shared.mesh.apply(&edits));
+                self.shared.mesh.apply(&edits);
                 edits.tiles.iter().for_each(|&tile| self.tiles.note(tile));
                 edits
                     .faces
@@ -110,14 +106,13 @@ impl ViewWorker {
                 // the channel has room for all lists
                 let _ = self.spare.try_send(edits);
             }
-            ViewInput::Variances(variances) => {
-                self.patches
-                    .note_vertices(self.shared.mesh.apply_variances(&variances));
+            ViewInput::Variances(version, variances) => {
+                self.shared.mesh.apply_variances(version, &variances);
             }
-            ViewInput::Session(replica) => {
-                self.tiles.restart(&replica);
-                self.patches = MeshPatches::of(&replica, self.shared.scan_sigma);
-                self.shared.mesh.begin_session(*replica);
+            ViewInput::Session(name) => {
+                self.shared.mesh.begin_session(&name);
+                self.tiles.restart(&self.shared.mesh.now().0);
+                self.followers = self.shared.mesh.follow_from_now();
                 // followers would see the new session only at the next change, so the whole state
                 // goes out
                 (self.whole, self.asked_whole) = (None, true);
@@ -127,25 +122,7 @@ impl ViewWorker {
                     .note_mismatch(face, distance, &self.shared.mesh.now().0);
             }
             ViewInput::Tip(tip) => self.tip = Some(tip),
-            ViewInput::Features(features, next) => {
-                self.port
-                    .publish(Publication::Features((*features).clone()));
-                self.port
-                    .publish(Publication::FeatureMarkers(feature_messages::markers(
-                        &features,
-                    )));
-                (self.features, self.next) = (features, next);
-            }
             ViewInput::Resync => self.asked_whole = true,
-            ViewInput::Diagnostics(diagnostics) => {
-                self.port.publish(Publication::Diagnostics(*diagnostics))
-            }
-            ViewInput::Parameters => {
-                let by = colour_by(&self.shared);
-                if std::mem::replace(&mut self.colour_by, by) != by {
-                    self.tiles.renew(&self.shared.mesh.now().0);
-                }
-            }
         }
     }
 
@@ -153,27 +130,21 @@ impl ViewWorker {
     ///
     /// - `is_last`: passes all tiles to the port.
     fn tick(&mut self, is_last: bool) -> bool {
-        let frame = self.shared.frame.as_str();
         if let Some(tip) = self.tip.take() {
-            self.port.publish(Publication::Tip(tip::markers(
-                &tip,
-                &self.features,
-                &self.next,
-                frame,
-            )));
+            let (features, next) = &*self.shared.features();
+            let markers = tip::markers(&tip, features, next, &self.shared.frame);
+            self.port.publish(Publication::Tip(markers));
         }
-        let (replica, is_complete) = self.shared.mesh.now();
+        let (mesh, is_complete) = self.shared.mesh.now();
         if !is_complete {
             return true;
         }
-        for part in self.patches.change(&replica, frame) {
+        while let Some(part) = self.followers.next_part(OF_A_PART) {
             self.port.publish(Publication::MeshPatch(part));
         }
         if self.whole.is_none() && std::mem::take(&mut self.asked_whole) {
             // the next change starts from the state sent last
-            self.whole = Some(Box::new(
-                self.patches.whole(Arc::clone(&replica), frame.to_owned()),
-            ));
+            self.whole = Some(Box::new(self.followers.whole(OF_A_PART)));
         }
         if let Some(whole) = &mut self.whole {
             let parts = whole.by_ref().take(PARTS_AT_ONCE);
@@ -188,14 +159,13 @@ impl ViewWorker {
         if self.shared.has_new_viewer.swap(false, Ordering::Relaxed) {
             self.tiles.renew_older_than(TILES_KEPT as u64);
         }
+        let by = colour_by(&self.shared);
+        if std::mem::replace(&mut self.colour_by, by) != by {
+            self.tiles.renew(&mesh);
+        }
         let now = self.clock.now();
         self.tiles.renew_settled(now);
-        let Self {
-            tiles,
-            colour_by,
-            port,
-            ..
-        } = self;
+        let Self { tiles, port, .. } = self;
         // tiles wait until there is a viewer
         let is_seen = self.shared.viewers.load(Ordering::Relaxed) > 0;
         let most = match (is_last, is_seen) {
@@ -203,7 +173,7 @@ impl ViewWorker {
             (true, true) => usize::MAX,
             (false, true) => TILES_AHEAD.saturating_sub(port.tiles_waiting()),
         };
-        tiles.take(most, now, &replica, (*colour_by, frame), |tile| {
+        tiles.take(most, now, &mesh, by, |tile| {
             port.publish(Publication::Tile(tile))
         });
         let waiting = if is_seen { self.tiles.waiting() } else { 0 };

@@ -1,5 +1,5 @@
-//! Content of the pages: the newest message of each topic, and the mesh. The node writes, and each
-//! page reads at its own pace.
+//! Messages for the pages: the newest of each topic. The node writes, and each page reads at its own
+//! pace.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex};
@@ -7,11 +7,10 @@ use std::sync::{Arc, Mutex};
 use serde::Serialize;
 use tokio::sync::watch;
 
-use super::mesh_copy::{MeshCopy, MeshState, PageId, TouchedVertex};
 use crate::ros::locked;
 use crate::ros::messages::{
-    DiagnosticArray, Feature, FeatureArray, HapticMismatch, MarkerArray, MeshPatch, Path,
-    ProbeResult, ProbeTouch,
+    DiagnosticArray, Feature, FeatureArray, HapticMismatch, MarkerArray, Path, ProbeResult,
+    ProbeTouch,
 };
 use crate::ros::port::Publication;
 
@@ -28,9 +27,9 @@ impl<M> Default for NewestMessage<M> {
     }
 }
 
-impl<M: Serialize> NewestMessage<M> {
-    fn write(&mut self, number: u64, message: M) {
-        *self = Self(number, Some(message));
+impl<M: Clone + Serialize> NewestMessage<M> {
+    fn write(&mut self, number: u64, message: &M) {
+        *self = Self(number, Some(message.clone()));
     }
 
     fn read(&self, topic: &str, seen: u64, into: &mut Vec<String>) {
@@ -52,7 +51,6 @@ pub(super) fn text_of(topic: &str, message: &impl Serialize) -> Option<String> {
     serde_json::to_string(&TopicMessage { topic, message }).ok()
 }
 
-/// Newest messages of each topic, for pages that come later.
 #[derive(Debug, Default)]
 struct BoardMessages {
     /// number of messages
@@ -66,12 +64,15 @@ struct BoardMessages {
     touches: VecDeque<(u64, ProbeTouch)>,
 }
 
-fn keep<M>(kept: &mut VecDeque<(u64, M)>, number: u64, message: M) {
+fn keep<M: Clone>(kept: &mut VecDeque<(u64, M)>, number: u64, message: &M) {
     if kept.len() == MOST_KEPT {
         kept.pop_front();
     }
-    kept.push_back((number, message));
+    kept.push_back((number, message.clone()));
 }
+
+/// A state of the shape of the mesh: session and version.
+pub(super) type MeshState = (String, u64);
 
 /// Vertex uncertainties and outlier marks at one state, as frames for the pages.
 #[derive(Debug)]
@@ -81,51 +82,33 @@ pub(super) struct UncertaintyFrames {
 }
 
 /// The content that all pages read.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Board {
-    mesh: Mutex<MeshCopy>,
     topics: Mutex<BoardMessages>,
     known: Mutex<Option<Arc<UncertaintyFrames>>>,
     changes: watch::Sender<()>,
 }
 
 impl Board {
-    /// - `whole`: the mesh of the node at its start.
-    pub fn new(whole: impl Iterator<Item = MeshPatch>) -> Self {
-        let mut mesh = MeshCopy::default();
-        whole.for_each(|part| mesh.take(part));
-        Self {
-            mesh: Mutex::new(mesh),
-            topics: Mutex::default(),
-            known: Mutex::default(),
-            changes: watch::Sender::new(()),
-        }
-    }
-
     /// Stores a publication of the node.
-    pub fn write(&self, publication: Publication) {
-        if let Publication::MeshPatch(patch) = publication {
-            locked(&self.mesh).take(patch);
-        } else {
-            let topics = &mut *locked(&self.topics);
-            topics.written += 1;
-            let number = topics.written;
-            match publication {
-                Publication::Features(features) => topics.features.write(number, features),
-                Publication::Tip(tip) => topics.tip.write(number, tip),
-                Publication::Path(path) => topics.path.write(number, path),
-                Publication::Mismatch(mismatch) => topics.mismatch.write(number, mismatch),
-                Publication::Diagnostics(diagnostics) => {
-                    topics.diagnostics.write(number, diagnostics)
-                }
-                Publication::ProbeResult(result) => keep(&mut topics.results, number, result),
-                Publication::ProbeTouch(touch) => keep(&mut topics.touches, number, touch),
-                Publication::Tile(_)
-                | Publication::FeatureMarkers(_)
-                | Publication::MeshPatch(_) => return,
-            }
+    pub fn write(&self, publication: &Publication) {
+        let topics = &mut *locked(&self.topics);
+        let number = topics.written + 1;
+        match publication {
+            Publication::Features(features) => topics.features.write(number, features),
+            Publication::Tip(tip) => topics.tip.write(number, tip),
+            Publication::Path(path) => topics.path.write(number, path),
+            Publication::Mismatch(mismatch) => topics.mismatch.write(number, mismatch),
+            Publication::Diagnostics(diagnostics) => topics.diagnostics.write(number, diagnostics),
+            Publication::ProbeResult(result) => keep(&mut topics.results, number, result),
+            Publication::ProbeTouch(touch) => keep(&mut topics.touches, number, touch),
+            // pages take the mesh from its feed
+            Publication::MeshPatch(_) => {}
+            // both repeat the mesh and the features, for RViz
+            Publication::Tile(_) | Publication::FeatureMarkers(_) => return,
         }
-        self.changes.send_replace(());
+        topics.written = number;
+        self.wake();
     }
 
     /// Notifies of every change.
@@ -170,45 +153,15 @@ impl Board {
             .cloned()
     }
 
-    /// Adds a page.
-    pub fn join(&self, page: PageId) {
-        locked(&self.mesh).join(page);
-    }
-
-    /// Removes a page.
-    pub fn leave(&self, page: PageId) {
-        locked(&self.mesh).leave(page);
-    }
-
-    /// The next part of the mesh for a page; as [`MeshCopy::next_for`].
-    pub fn mesh_for(&self, page: PageId) -> Option<MeshPatch> {
-        locked(&self.mesh).next_for(page)
-    }
-
-    /// Session of the mesh, and the version of its shape.
-    pub fn shape_state(&self) -> MeshState {
-        locked(&self.mesh).shape_state()
-    }
-
-    /// The vertices with support other than the scan.
-    pub fn touched(&self) -> Vec<TouchedVertex> {
-        locked(&self.mesh).touched()
-    }
-
     /// Sets the vertex uncertainties of a state.
     pub fn set_known(&self, known: UncertaintyFrames) {
         *locked(&self.known) = Some(Arc::new(known));
         self.wake();
     }
 
-    /// The vertex uncertainties, if they are of the present state of the mesh.
-    pub fn known(&self) -> Option<Arc<UncertaintyFrames>> {
+    /// The vertex uncertainties, if they are of this state of the mesh.
+    pub fn known(&self, state: &MeshState) -> Option<Arc<UncertaintyFrames>> {
         let known = locked(&self.known).clone()?;
-        (known.state == self.shape_state()).then_some(known)
-    }
-
-    /// Name of the session.
-    pub fn session(&self) -> String {
-        locked(&self.mesh).session().to_owned()
+        (known.state == *state).then_some(known)
     }
 }

@@ -15,8 +15,7 @@ use tokio::sync::watch;
 use tokio::time::{MissedTickBehavior, interval, timeout};
 
 use super::access::Role;
-use super::board::text_of;
-use super::mesh_copy::{MeshState, PageId};
+use super::board::{MeshState, text_of};
 use super::site::Site;
 use crate::ros::messages::MeshPatch;
 use crate::ros::port::Reply;
@@ -31,6 +30,8 @@ const GONE_AFTER: Duration = Duration::from_secs(20);
 const MOST_ANSWERS: usize = 64;
 /// Maximum rate of a page's messages, 1/s; hold-to-run beats come 50 times per second.
 const MOST_PER_SECOND: u32 = 200;
+/// Maximum number of vertices, or faces, of one message: 1.4 MB.
+pub(super) const OF_A_MESSAGE: usize = 1 << 16;
 /// Kind of a binary message: a `MeshPatch`.
 const MESH_PATCH: u8 = 1;
 
@@ -51,10 +52,9 @@ struct PageMessage {
 /// Serves a page until it disconnects.
 pub(super) async fn serve(socket: WebSocket, site: Arc<Site>, role: Role) {
     let page = site.entrance.pages_so_far.fetch_add(1, Ordering::Relaxed);
-    site.board.join(page);
     let (to_page, mut from_page) = socket.split();
     let (answers, waiting) = channel(MOST_ANSWERS);
-    let sending = send(to_page, Arc::clone(&site), page, role, waiting);
+    let sending = send(to_page, Arc::clone(&site), role, waiting);
     let hearing = async {
         let mut rate = Rate::default();
         while let Ok(Some(Ok(message))) = timeout(GONE_AFTER, from_page.next()).await {
@@ -72,7 +72,6 @@ pub(super) async fn serve(socket: WebSocket, site: Arc<Site>, role: Role) {
         () = sending => {}
         () = hearing => {}
     }
-    site.board.leave(page);
     // the other pages show the number of pages
     site.board.wake();
 }
@@ -120,11 +119,10 @@ fn hear(text: &str, site: &Site, role: Role, answers: &Sender<String>) {
 async fn send(
     mut to_page: SplitSink<WebSocket, Message>,
     site: Arc<Site>,
-    page: PageId,
     role: Role,
     mut answers: Receiver<String>,
 ) {
-    let mut changes = site.board.changes();
+    let (mut changes, follower) = (site.board.changes(), site.mesh.follow());
     let mut frames = interval(FRAME);
     frames.set_missed_tick_behavior(MissedTickBehavior::Delay);
     let (mut seen, mut state, mut noted, mut signed) =
@@ -150,14 +148,14 @@ async fn send(
             replayed.clone_from(&now);
             messages.push(Message::text(now));
         }
-        let annotations = site.annotations.of(&site.board.session());
+        let annotations = site.annotations.of(&site.mesh.session());
         let now = text_of("annotations", &annotations).unwrap_or_default();
         if now != noted {
             noted.clone_from(&now);
             messages.push(Message::text(now));
         }
         messages.extend(site.board.read(&mut seen).into_iter().map(Message::text));
-        let mesh = site.board.mesh_for(page);
+        let mesh = follower.next_part(OF_A_MESSAGE);
         let has_more = mesh.is_some();
         // a copy only for the comparison with a nominal part
         let deviations = site
@@ -174,7 +172,7 @@ async fn send(
         if !has_more
             && let Some(known) = site
                 .board
-                .known()
+                .known(&site.mesh.now().0.shape_state())
                 .filter(|known| known.state != known_state)
         {
             known_state.clone_from(&known.state);

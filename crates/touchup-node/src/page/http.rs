@@ -111,7 +111,7 @@ async fn list_sessions(State(site): State<Arc<Site>>, headers: HeaderMap) -> Res
     if let Err(response) = role_of(&site, &headers) {
         return *response;
     }
-    let (folder, current) = (site.session_folder.clone(), site.board.session());
+    let (folder, current) = (site.session_folder.clone(), site.mesh.session());
     match tokio::task::spawn_blocking(move || sessions(&folder, &current)).await {
         Ok(Ok(listed)) => as_json(&Value::from(listed)),
         Ok(Err(error)) => refusal(

@@ -11,13 +11,13 @@ use tokio::sync::oneshot;
 use tokio::time::sleep;
 
 use super::background::begin;
-use super::board::UncertaintyFrames;
-use super::mesh_copy::{MeshState, OF_A_MESSAGE, TouchedVertex};
+use super::board::{MeshState, UncertaintyFrames};
+use super::connection::OF_A_MESSAGE;
 use super::site::Site;
 use super::vertex_numbers::{VertexNumber, frame};
 use crate::ros::port::{Arrival, Reply};
 use touchup_geometry::mesh::{FaceTree, TriMesh};
-use touchup_method::reconstruct::Patcher;
+use touchup_method::reconstruct::{Patcher, Support};
 
 /// Polling period of the mesh.
 const LOOK: Duration = Duration::from_millis(250);
@@ -34,7 +34,7 @@ pub(super) async fn follow(site: Arc<Site>) {
         (MeshState::default(), Instant::now(), MeshState::default());
     loop {
         sleep(LOOK).await;
-        let state = site.board.shape_state();
+        let state = site.mesh.now().0.shape_state();
         if state != seen {
             (seen, still) = (state, Instant::now());
             continue;
@@ -49,7 +49,8 @@ pub(super) async fn follow(site: Arc<Site>) {
             drop(to.send(copy))
         })));
         let Ok(Some(copy)) = copy.await else { continue };
-        let (scan, touched) = (Arc::clone(&site.scan_mesh), site.board.touched());
+        let scan = Arc::clone(&site.scan_mesh);
+        let touched: Vec<_> = site.mesh.now().0.touched().collect();
         // it may be of a replay, beside a running session
         let Ok(evaluated) = begin("knowledge", move || frames_of(&copy, &scan, &touched)) else {
             continue;
@@ -63,7 +64,7 @@ pub(super) async fn follow(site: Arc<Site>) {
 fn frames_of(
     copy: &Receiver<Patcher>,
     scan: &(TriMesh, FaceTree),
-    touched: &[TouchedVertex],
+    touched: &[(u32, Point3<f64>, Support)],
 ) -> Vec<Vec<u8>> {
     let Ok(mut patcher) = copy.recv_timeout(COPY_WAIT) else {
         return Vec::new();

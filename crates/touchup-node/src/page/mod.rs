@@ -1,8 +1,8 @@
 //! The operator page: a port beside the network's. The node's publications go to both, and calls of
 //! pages come into the same inbox.
 //!
-//! One thread serves all pages. The node only stores news under a lock, for the time of a message
-//! copy: a slow page skips states and delays nobody.
+//! One thread serves all pages, which follow the feed of the mesh. The node only stores other news
+//! under a lock, for the time of a message copy: a slow page skips states and delays nobody.
 
 mod access;
 mod annotations;
@@ -16,7 +16,6 @@ mod error;
 mod http;
 mod knowledge;
 mod listener;
-mod mesh_copy;
 mod nominal;
 mod own_addresses;
 mod page;
@@ -59,7 +58,7 @@ use self::report_work::Reports;
 pub use self::setup::{NodeSetup, SetupParams, SetupStep};
 use self::site::{ScanShown, Site};
 use crate::ros::inbox::Inbox;
-use crate::ros::messages::MeshPatch;
+use crate::ros::mesh_feed::MeshFeed;
 use crate::ros::port::Port;
 use touchup_geometry::mesh::{FaceTree, TriMesh};
 use touchup_io::mesh_file::MeshUnit;
@@ -183,7 +182,7 @@ impl WebServer {
 
     /// Serves a node: returns its port, which sends to `network` and to the page.
     ///
-    /// - `whole`: the mesh of the node at its start.
+    /// - `mesh`: of the node.
     ///
     /// # Errors
     /// [`WebError`]
@@ -191,7 +190,7 @@ impl WebServer {
         &self,
         facts: NodeFacts,
         inbox: Inbox,
-        whole: impl Iterator<Item = MeshPatch>,
+        mesh: Arc<MeshFeed>,
         network: Arc<dyn Port>,
     ) -> Result<Arc<dyn Port>, WebError> {
         let file = facts
@@ -200,7 +199,8 @@ impl WebServer {
             .map(|name| name.to_string_lossy().into_owned())
             .unwrap_or_default();
         let site = Arc::new(Site {
-            board: Board::new(whole),
+            board: Board::default(),
+            mesh,
             calls: Calls::new(&inbox)?,
             inbox,
             entrance: Arc::clone(&self.entrance),

@@ -13,13 +13,7 @@ pub(super) struct PagePort {
 
 impl Port for PagePort {
     fn publish(&self, publication: Publication) {
-        // both repeat the mesh and the features, for RViz
-        if !matches!(
-            publication,
-            Publication::Tile(_) | Publication::FeatureMarkers(_)
-        ) {
-            self.site.board.write(publication.clone());
-        }
+        self.site.board.write(&publication);
         self.network.publish(publication);
     }
 

@@ -88,7 +88,7 @@ async fn report(
         let why = "another report is being made: ask again when it is there";
         return Err(ReportRefusal(StatusCode::TOO_MANY_REQUESTS, why.to_owned()));
     };
-    let is_current = session == site.board.session();
+    let is_current = session == site.mesh.session();
     let folder = SessionFolder::open(&site.session_folder, session);
     let session =
         folder.map_err(|error| ReportRefusal(StatusCode::NOT_FOUND, error.to_string()))?;

@@ -16,6 +16,7 @@ use super::nominal::Nominal;
 use super::replay::ReplayControl;
 use super::report_work::Reports;
 use crate::ros::inbox::Inbox;
+use crate::ros::mesh_feed::MeshFeed;
 use crate::ros::stop::ArmMotion;
 use touchup_geometry::mesh::{FaceTree, TriMesh};
 
@@ -26,6 +27,8 @@ const REPLAYED: &str =
 /// State that all pages share.
 pub(super) struct Site {
     pub board: Board,
+    /// the mesh of the node
+    pub mesh: Arc<MeshFeed>,
     pub calls: Calls,
     pub inbox: Inbox,
     pub entrance: Arc<Entrance>,
@@ -86,10 +89,10 @@ impl Site {
         SiteState {
             role,
             program: concat!("touchup ", env!("CARGO_PKG_VERSION")),
-            session: self.replay.as_ref().map_or_else(
-                || self.board.session(),
-                |replay| replay.session().to_owned(),
-            ),
+            session: self
+                .replay
+                .as_ref()
+                .map_or_else(|| self.mesh.session(), |replay| replay.session().to_owned()),
             is_paused: stops.is_paused(),
             scan: &self.scan,
             nominal_part: self.reports.part_name(),
@@ -123,7 +126,7 @@ impl Site {
             serde_json::from_value(request).map_err(|error| error.to_string())?;
         let feature = self.board.feature(request.id);
         self.annotations
-            .annotate(&self.board.session(), request, feature)?;
+            .annotate(&self.mesh.session(), request, feature)?;
         self.board.wake();
         Ok(json!({ "success": true, "message": "noted" }))
     }

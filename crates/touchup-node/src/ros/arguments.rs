@@ -243,18 +243,16 @@ impl NodeConfig {
         }
     }
 
-    /// Topics of wrenches and poses, not yet remapped: as [`Self::sample_topics`], or transforms
-    /// for the poses.
-    pub fn heard_topics(&self) -> [&'static str; 2] {
+    /// Topics of wrenches and poses that the node hears, not yet remapped: as
+    /// [`Self::sample_topics`] without an arm, or transforms for the poses.
+    pub fn heard_topics(&self) -> Vec<&'static str> {
         let [wrench, pose] = self.sample_topics();
-        [
-            wrench,
-            if self.parameters.pose_frames().is_none() {
-                pose
-            } else {
-                "/tf"
-            },
-        ]
+        match (self.parameters.has_arm(), self.parameters.pose_frames()) {
+            (false, None) => vec![wrench, pose],
+            (false, Some(_)) => vec![wrench, "/tf"],
+            (true, None) => vec![],
+            (true, Some(_)) => vec!["/tf"],
+        }
     }
 
     fn remap(&mut self, text: &str) -> Result<(), ArgumentError> {

@@ -3,6 +3,7 @@
 //! The node knows [`port`] alone. The build selects its implementation.
 
 pub mod arguments;
+mod arm_samples;
 pub mod clock;
 pub(crate) mod convert;
 #[cfg(feature = "ros")]
@@ -10,6 +11,7 @@ pub mod dds;
 pub(crate) mod exchange;
 pub mod in_process;
 pub mod inbox;
+pub mod mesh_feed;
 pub mod messages;
 pub mod names;
 mod parameter_services;
@@ -25,6 +27,7 @@ pub(crate) mod services;
 pub mod stop;
 mod topics;
 
+pub use arm_samples::ArmSamples;
 pub use convert::{as_pose, as_wrench};
 #[cfg(all(feature = "ros", any(not(feature = "r2r"), feature = "r2r-check")))]
 pub use dds::{arm_port, samples, start};

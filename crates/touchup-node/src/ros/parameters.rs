@@ -509,6 +509,11 @@ impl Parameters {
         }
     }
 
+    /// Whether the node has an arm.
+    pub fn has_arm(&self) -> bool {
+        self.string("robot") != "none"
+    }
+
     /// The frame whose transforms give the pose, and its base frame: `tool0 in base`, or `tool0`,
     /// meaning in the cell.
     pub fn pose_frames(&self) -> Option<[&str; 2]> {

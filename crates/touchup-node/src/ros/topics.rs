@@ -130,7 +130,10 @@ where
     B: SubscribesSamples + Subscribes<TFMessage> + Subscribes<PointStamped> + Subscribes<Clock>,
 {
     let [wrench, pose] = config.sample_topics();
-    for (topic, kind) in [(wrench, SampleKind::Wrench), (pose, SampleKind::Pose)] {
+    // an arm passes its samples within the process
+    let has_arm = config.parameters.has_arm();
+    let topics = (!has_arm).then_some([(wrench, SampleKind::Wrench), (pose, SampleKind::Pose)]);
+    for (topic, kind) in topics.into_iter().flatten() {
         let remedy = "name a type that can be read, or none";
         let refused = |reason| RosError::Refused {
             call: "subscribing to a topic",
@@ -165,6 +168,47 @@ mod tests {
 
     #[derive(Default)]
     struct Announced(Vec<Topic>);
+
+    impl<M> Subscribes<M> for Announced {
+        fn subscribe(
+            &mut self,
+            topic: Topic,
+            _: fn(&PortState, M) -> Arrival,
+        ) -> Result<(), RosError> {
+            self.0.push(topic);
+            Ok(())
+        }
+    }
+
+    impl SubscribesSamples for Announced {
+        fn subscribe_samples(&mut self, topic: Topic, _: SampleSource) -> Result<(), RosError> {
+            self.0.push(topic);
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn a_node_with_an_arm_hears_no_other_samples() {
+        let heard = |parameters: &[&str]| {
+            let words = parameters
+                .iter()
+                .flat_map(|one| ["-p", one].map(str::to_owned));
+            let config = NodeConfig::new(&words.collect::<Vec<_>>(), |_| None).unwrap();
+            let mut subscribed = Announced::default();
+            subscribe(&config, &mut subscribed).unwrap();
+            let topics = subscribed.0.into_iter().map(|topic| topic.name);
+            let named = config.heard_topics();
+            (topics.collect::<Vec<_>>(), named)
+        };
+        let others = ["/tf", "/tf_static", "/clicked_point"];
+        let samples = vec!["probe/wrench", "probe/pose"];
+        let all = [&samples[..], &others].concat();
+        assert_eq!(heard(&["source:=probe"]), (all, samples));
+        let probing = ["source:=probe", "robot:=sim"];
+        assert_eq!(heard(&probing), (others.into(), vec![]));
+        let by_tf = ["source:=probe", "robot:=sim", "pose_frame:=tool0"];
+        assert_eq!(heard(&by_tf), (others.into(), vec!["/tf"]));
+    }
 
     impl<M> Publishes<M> for Announced {
         fn publisher(&mut self, topic: Topic) -> Result<Publisher<M>, RosError> {

@@ -17,7 +17,6 @@ mod kept_samples;
 mod latency;
 mod probed;
 mod renewals;
-mod shown;
 mod worker;
 
 use std::borrow::Cow;

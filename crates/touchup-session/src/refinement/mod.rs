@@ -10,6 +10,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
+use nalgebra::Point3;
+
 use crate::live::{
     Engine, EngineResult, EvidenceReplay, Gate, Latencies, LiveError, Pace, Renewal,
 };
@@ -21,9 +23,11 @@ use crate::scene::{CutScan, RegionCut, Scene, SceneError};
 use crate::session::{OutcomeError, RefinedMesh, StrokeChanges, StrokeReplay};
 use crate::threads::Threads;
 use touchup_features::diagnose::InputFinding;
-use touchup_geometry::mesh::{FaceTree, RepairReport, TriMesh};
+use touchup_geometry::mesh::{FaceHit, FaceTree, RepairReport, TriMesh};
 use touchup_io::mesh_file::MeshUnit;
-use touchup_method::haptic::{Footprint, RefineCounts, RefineError, ScanRegion, Update};
+use touchup_method::haptic::{
+    Footprint, RefineCounts, RefineError, RefineParams, ScanRegion, Update,
+};
 use touchup_method::reconstruct::CloudSummary;
 use touchup_method::stylus::{
     ContactSample, FrictionCoefficient, MarkerFilter, Message, Sample, SettingError, WrenchFrame,
@@ -42,10 +46,7 @@ use offsets::ContactPoints;
 use pace::RealTime;
 use watch::InputWatch;
 
-/// Message for a scene without an update that moves the mesh.
-pub const NOTHING_MOVES: &str =
-    "the scene says `refine: off`, so nothing would move the mesh: take that out of it";
-/// Room reserved for new faces in real time.
+/// Room reserved for new faces beside the samples.
 const ROOM: usize = 1 << 18;
 
 /// Error of a refinement.
@@ -58,7 +59,7 @@ pub enum RefinementError {
     #[error(transparent)]
     Setting(#[from] SettingError),
     /// The scene has no update.
-    #[error("{NOTHING_MOVES}")]
+    #[error("the scene says `refine: off`, so nothing would move the mesh: take that out of it")]
     NothingMoves,
     /// The scan.
     #[error(transparent)]
@@ -123,6 +124,40 @@ impl RefinementInput {
             scan: Arc::new((mesh, tree)),
             cut,
         })
+    }
+
+    /// Engine of this input, without touches.
+    ///
+    /// - `wrench_frame`: axes of the wrenches.
+    /// - `beside`: schedule of the patch beside the samples; `None`: once, at the end.
+    ///
+    /// # Errors
+    /// [`RefinementError::NothingMoves`], [`RefinementError::Live`].
+    pub fn engine(
+        &self,
+        wrench_frame: WrenchFrame,
+        beside: Option<(Pace, Gate)>,
+    ) -> Result<Engine, RefinementError> {
+        let patch = self.scene.patcher_params();
+        let patch = patch.map(|params| self.cut.patcher_params(params));
+        let renewal = match beside {
+            Some((pace, gate)) => Renewal::Beside {
+                scan: Arc::clone(&self.scan),
+                pace,
+                room: ROOM,
+                gate,
+            },
+            None => Renewal::AtEnd,
+        };
+        let (mesh, params) = (self.scan.0.clone(), self.update_params(wrench_frame)?);
+        Ok(Engine::new(mesh, params, patch, renewal)?)
+    }
+
+    /// Settings of the haptic update.
+    fn update_params(&self, wrench_frame: WrenchFrame) -> Result<RefineParams, RefinementError> {
+        let params = self.scene.refine_params(wrench_frame);
+        let params = params.ok_or(RefinementError::NothingMoves)?;
+        Ok(self.cut.refine_params(params))
     }
 
     /// Memory of the scan, bytes.
@@ -191,8 +226,9 @@ pub struct InputNames<'a> {
 /// Options of a refinement.
 #[derive(Clone, Debug, Default)]
 pub struct RefinementOptions {
-    /// whether samples come in real time, with the patch beside them; else as fast as possible
-    pub is_live: bool,
+    /// pace of the patch beside samples in real time; `None`: as fast as possible, with the patch at
+    /// the end
+    pub live: Option<Pace>,
     /// undone, redone, excluded and restored strokes of a session
     pub strokes: StrokeChanges,
     /// whether to estimate the rigid offset of the scan from the touched part, without applying it
@@ -259,30 +295,16 @@ impl Refinement {
         wrench_frame: WrenchFrame,
         options: RefinementOptions,
     ) -> Result<Self, RefinementError> {
-        let RefinementInput { scene, scan, cut } = &input;
-        let params = scene
-            .refine_params(wrench_frame)
-            .ok_or(RefinementError::NothingMoves)?;
-        let params = cut.refine_params(params);
-        let patch = scene
-            .patcher_params()
-            .map(|params| cut.patcher_params(params));
-        let watch = InputWatch::new(scene.input_monitor_params(wrench_frame), &params)?;
+        let params = input.update_params(wrench_frame)?;
+        let monitor = input.scene.input_monitor_params(wrench_frame);
+        let watch = InputWatch::new(monitor, &params)?;
         let contact_points = options
             .registration
             .then(|| ContactPoints::new(&params))
             .transpose()?;
-        let renewal = match options.is_live {
-            true => Renewal::Beside {
-                scan: Arc::clone(scan),
-                pace: Pace::default(),
-                room: ROOM,
-                gate: Gate::default(),
-            },
-            false => Renewal::AtEnd,
-        };
         let region = params.region;
-        let mut engine = Engine::new(scan.0.clone(), params, patch, renewal)?;
+        let beside = options.live.map(|pace| (pace, Gate::default()));
+        let mut engine = input.engine(wrench_frame, beside)?;
         if options.strokes.has_exchanges() {
             engine.keep_strokes();
         }
@@ -291,7 +313,7 @@ impl Refinement {
             region,
             watch,
             strokes: options.strokes.replay(),
-            real_time: options.is_live.then(RealTime::default),
+            real_time: options.live.map(|_| RealTime::default()),
             contact_points,
             pushes: Latencies::new(),
             accepted: 0,
@@ -313,6 +335,17 @@ impl Refinement {
         match &self.stage {
             SampleConsumer::Moving(engine) => engine.mesh(),
             SampleConsumer::Keeping { .. } => &self.input.scan.0,
+        }
+    }
+
+    /// Face of [`Self::mesh`] nearest to a place, within a reach (m).
+    pub fn closest_face(&self, place: &Point3<f64>, reach: f64) -> Option<FaceHit> {
+        match &self.stage {
+            SampleConsumer::Moving(engine) => engine.refiner().closest_face(place, reach),
+            SampleConsumer::Keeping { .. } => {
+                let (scan, tree) = &*self.input.scan;
+                tree.closest(scan, place, reach)
+            }
         }
     }
 

@@ -1,13 +1,14 @@
 //! Converts sections of the YAML to the settings of the modules.
 
 use std::collections::BTreeMap;
+use std::time::SystemTime;
 
 use nalgebra::Isometry3;
 
 use super::sections::{NO_TURN, unit_quaternion};
 use super::{
-    CompensationSection, GravityAxes, Mode, ModelName, PayloadSection, RefineSection, RobotSection,
-    ScanToSpaceSection, Scene, TipSection,
+    CheckStanding, CompensationSection, GravityAxes, Mode, ModelName, PayloadSection,
+    RefineSection, RobotSection, ScanToSpaceSection, Scene, TipSection,
 };
 use touchup_features::diagnose::InputMonitorParams;
 use touchup_method::haptic::{ContactModel, RefineParams, RoiSize, TipParams, relaxing_alpha};
@@ -36,6 +37,18 @@ impl Scene {
         let pose_wo = self.scan_to_space.as_ref().map(ScanToSpaceSection::pose_wo);
         let p_ht = self.tip.as_ref().and_then(|tip| tip.offset);
         (pose_wo.is_some() || p_ht.is_some()).then_some(Placement { pose_wo, p_ht })
+    }
+
+    /// Whether the scene lets an arm move.
+    pub fn allows_motion(&self) -> bool {
+        self.robot.as_ref().is_some_and(|robot| robot.allow_motion)
+    }
+
+    /// Check of the arm and its doubts, as [`RobotSection::check_standing`]; `None` without
+    /// `robot`.
+    pub fn check_standing(&self, now: SystemTime) -> Option<CheckStanding> {
+        let robot = self.robot.as_ref()?;
+        Some(robot.check_standing(now))
     }
 
     /// The robot cell and its probing parameters; `None` without `robot`.

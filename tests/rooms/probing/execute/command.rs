@@ -462,7 +462,7 @@ type Refused<'a> = (&'a [&'a str], fn(String) -> String, &'a str);
 #[test]
 fn what_must_not_be_is_refused_by_name() {
     let same = |scene: String| scene;
-    let refused: [Refused; 9] = [
+    let refused: [Refused; 10] = [
         (
             &["--feature", "hole@16,36,12", "--max-force-n", "0.8"],
             same,
@@ -495,6 +495,11 @@ fn what_must_not_be_is_refused_by_name() {
             &["--feature", "hole@16,36,12"],
             |scene| scene.replace("ur5e", "ur9"),
             "ur3e, ur5e",
+        ),
+        (
+            &["--feature", "hole@16,36,12"],
+            |scene| scene.replace("\nrefine:", "\nrefine: off"),
+            "nothing would move the mesh: take that out of it",
         ),
     ];
     for (more, change, part) in refused {

@@ -39,17 +39,11 @@ impl RequestSettings {
         let mut params = configured
             .narrowed(&by)
             .map_err(|why| bad(why.to_string()))?;
+        let (search, link) = (settings.max_search_speed, settings.max_link_speed);
+        let touch = &mut params.touch;
         for (what, asked, speed) in [
-            (
-                "max_search_speed",
-                settings.max_search_speed,
-                &mut params.touch.search_speed,
-            ),
-            (
-                "max_link_speed",
-                settings.max_link_speed,
-                &mut params.touch.link_speed,
-            ),
+            ("max_search_speed", search, &mut touch.search_speed),
+            ("max_link_speed", link, &mut touch.link_speed),
         ] {
             match some(asked) {
                 None => {}

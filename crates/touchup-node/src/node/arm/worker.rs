@@ -31,9 +31,8 @@ use crate::ros::stop::{ArmMotion, StopState};
 use touchup_geometry::mesh::TriMesh;
 use touchup_io::probed_touches_file::append_probed_touches;
 use touchup_probing::arm::{Arm, StopRequest};
-use touchup_probing::execute::{
-    Ending, Flag, ProbeParams, Prober, References, RobotCell, WayOut, plan,
-};
+use touchup_probing::execute::{Ending, Flag, FlagResult, Plan, ProbeParams, RobotCell};
+use touchup_session::probing_run::ProbingRun;
 use touchup_session::scene::simulated_arm;
 use touchup_sim::{MeshSurface, SimArm};
 
@@ -117,15 +116,11 @@ struct ArmWorker {
     link: ArmLink,
     port: Arc<dyn Port>,
     features: SyncSender<FeatureInput>,
-    cell: RobotCell,
+    run: ProbingRun,
     params: ProbeParams,
     inputs: Receiver<FolderOrder>,
     /// the time of ROS at the last state, ns
     ros_ns: i64,
-    /// way out of the feature at which the last probing stopped
-    way_out: Option<WayOut>,
-    /// contacts touched again after each feature
-    references: References,
 }
 
 /// Starts the arm thread.
@@ -139,7 +134,7 @@ pub fn start(
     features: SyncSender<FeatureInput>,
     stops: &Arc<StopState>,
 ) -> Result<(ArmHandle, JoinHandle<()>), NodeError> {
-    let (cell, params) = setup.scene.probing().ok_or(NodeError::NoRobot)?;
+    let (cell, params) = setup.input.scene.probing().ok_or(NodeError::NoRobot)?;
     let (to, inputs) = sync_channel(QUEUE);
     let common = Arc::new(SharedArmState::new(Arc::clone(stops)));
     stops.look();
@@ -161,12 +156,10 @@ pub fn start(
         link,
         port: Arc::clone(port),
         features,
-        cell,
+        run: ProbingRun::new(cell),
         params,
         inputs,
         ros_ns: i64::MIN,
-        way_out: None,
-        references: References::default(),
     };
     let run = move || {
         let EndsArm(stops) = &ends;
@@ -204,8 +197,8 @@ impl ArmWorker {
             .map_err(|error| format!("the simulated arm has no part to touch: {error}"))?;
         let arm = SimArm::new(
             &surface,
-            simulated_arm(&self.cell, &self.params),
-            &self.cell.above(part),
+            simulated_arm(&self.run.cell, &self.params),
+            &self.run.cell.above(part),
         );
         let arm = arm.map_err(|error| format!("the simulated arm cannot begin: {error}"))?;
         self.run(&mut PacedArm::new(self.link.setup.clock.clone(), arm));
@@ -359,8 +352,8 @@ impl ArmWorker {
 
     /// Doubts about the check of the arm, as an addition to an ending; empty: none.
     fn doubts_of_check(&self) -> String {
-        let robot = self.link.setup.scene.robot.as_ref();
-        let standing = robot.map(|robot| robot.check_standing(SystemTime::now()));
+        let scene = &self.link.setup.input.scene;
+        let standing = scene.check_standing(SystemTime::now());
         let doubtful = standing.filter(|standing| !standing.doubts.is_empty());
         doubtful.map_or_else(String::new, |standing| format!("; {standing}"))
     }
@@ -448,7 +441,7 @@ impl ArmWorker {
                 .link
                 .common
                 .last()
-                .map(|state| self.cell.place(&state.pose_bt))
+                .map(|state| self.run.cell.place(&state.pose_bt))
                 .unwrap_or_default();
             let far = |target: &Flag| (target.place - tip).norm();
             targets.sort_by(|a, b| far(a).total_cmp(&far(b)));
@@ -463,14 +456,7 @@ impl ArmWorker {
     ) -> Result<RequestSettings, (u8, String)> {
         let wanted = RequestSettings::of(settings, &self.params, target.kind)?;
         if !wanted.is_dry_run {
-            let scene_allows = self
-                .link
-                .setup
-                .scene
-                .robot
-                .as_ref()
-                .is_some_and(|robot| robot.allow_motion);
-            if !scene_allows {
+            if !self.link.setup.input.scene.allows_motion() {
                 let why = "the arm may not move: look at a dry run first, then set robot.allow_motion: true in the scene";
                 return Err((ProbeResult::MOTION_NOT_ALLOWED, why.to_owned()));
             }
@@ -490,7 +476,6 @@ impl ArmWorker {
         Ok(wanted)
     }
 
-    #[expect(clippy::too_many_lines)]
     fn probe_one(
         &mut self,
         folder: &Path,
@@ -504,116 +489,78 @@ impl ArmWorker {
         let Some(state) = self.link.common.last() else {
             return not_ready("nothing has come from the arm yet");
         };
-        let (cell, params, flag, way_out) = (
-            self.cell.clone(),
-            wanted.params.clone(),
-            *target,
-            self.way_out.clone(),
-        );
+        let (run, params, flag) = (self.run.clone(), wanted.params.clone(), *target);
         let ready = ask_mesh(&self.link.setup, move |still| {
-            let planned = plan(&cell, &params, &still, &flag, &state, way_out.as_ref());
+            let planned = run.plan(&params, &flag, &state, &still);
             (still, planned)
         });
         let Some((still, planned)) = self.wait(arm, &ready) else {
             return not_ready("the mesh was not complete in time: probe again");
         };
-        let mut world = ArmWorld::new(&self.link, still, watched, counts);
         match planned {
             Ok(planned) => {
-                let pose = |place| PoseStamped {
-                    header: header(0, &self.link.setup.shared.frame),
-                    pose: Pose {
-                        position: point(place),
-                        ..Pose::default()
-                    },
-                };
-                let poses = planned.path.iter().map(pose).collect();
-                self.port.publish(Publication::Path(PathMsg {
-                    header: self.header(),
-                    poses,
-                }));
+                self.publish_path(&planned);
                 if wanted.is_dry_run {
                     return planned_result(target, &planned);
                 }
             }
             // no such pattern or quantity
             Err(error) => {
-                return refused(
-                    target,
-                    ProbeResult::BAD_REQUEST,
-                    format!("nothing is planned: {error}"),
-                );
+                let why = format!("nothing is planned: {error}");
+                return refused(target, ProbeResult::BAD_REQUEST, why);
             }
         }
-        let prober = Prober::new(arm, &self.cell, &wanted.params, &mut world);
-        let references = std::mem::take(&mut self.references);
-        let mut prober = prober.leaving_by(self.way_out.take()).beside(references);
-        let probed = prober.probe(target);
-        // a contact that moved the part invalidates earlier touches
-        if !probed.ending.is_displaced() {
-            self.references = prober.take_references();
-        }
-        self.way_out = prober.into_way_out();
+        let mut world = ArmWorld::new(&self.link, still, watched, counts);
+        let probed = self.run.probe(&wanted.params, target, arm, &mut world);
         self.link.common.stops.enter(ArmMotion::Rests);
         info!(feature = target.id, ending = %probed.ending, touches = probed.touches.len(), "probed");
         if let Ending::Stopped(_) = &probed.ending {
             self.link.common.stop(&probed.ending.to_string());
         }
-        let ball_radius = wanted.params.pattern.ball_radius;
+        self.pass_on(folder, target, &probed);
+        self.result(target, &probed)
+    }
+
+    fn publish_path(&self, planned: &Plan) {
+        let pose = |place| PoseStamped {
+            header: header(0, &self.link.setup.shared.frame),
+            pose: Pose {
+                position: point(place),
+                ..Pose::default()
+            },
+        };
+        self.port.publish(Publication::Path(PathMsg {
+            header: self.header(),
+            poses: planned.path.iter().map(pose).collect(),
+        }));
+    }
+
+    /// Passes touches and measurement of a feature to the session's folder, the topics and the
+    /// features.
+    fn pass_on(&self, folder: &Path, target: &Flag, probed: &FlagResult) {
+        let ball_radius = self.params.pattern.ball_radius;
         let offset_ns = self.link.offset_ns.unwrap_or(0);
-        if let Err(error) =
-            append_probed_touches(&probed, ball_radius, offset_ns, &folder.join(TOUCHES))
-        {
+        let path = folder.join(TOUCHES);
+        if let Err(error) = append_probed_touches(probed, ball_radius, offset_ns, &path) {
             warn!(%error, "the touches of a feature are on the topic alone");
         }
-        let is_whole = matches!(
-            probed.ending,
-            Ending::ToleranceReached
-                | Ending::TouchesSpent
-                | Ending::CalibrationLimits { .. }
-                | Ending::TimeSpent
-        );
-        if let Some(feature) = probed
-            .found
-            .as_ref()
-            .and_then(|found| found.feature.clone())
-            .filter(|_| is_whole)
-        {
-            // a quantity not known well enough stays requested
-            let is_done = matches!(probed.ending, Ending::ToleranceReached);
-            let session = folder
-                .file_name()
-                .unwrap_or_default()
-                .to_string_lossy()
-                .into_owned();
-            let measured = ArmMeasurement {
-                session,
-                id: target.id,
-                feature,
-                is_done,
-            };
-            if self
-                .features
-                .try_send(FeatureInput::Measured(Box::new(measured)))
-                .is_err()
-            {
+        if let Some(measured) = measured(folder, probed) {
+            let measured = FeatureInput::Measured(Box::new(measured));
+            if self.features.try_send(measured).is_err() {
                 warn!(
                     feature = target.id,
                     "what was measured is in the answer, and not among the features"
                 );
             }
         }
-        for touch in touches_of(
-            target,
-            &probed,
-            ball_radius,
-            &self.cell,
-            offset_ns,
-            &self.link.setup.shared.frame,
-        ) {
+        let (cell, frame) = (&self.run.cell, &self.link.setup.shared.frame);
+        for touch in touches_of(target, probed, ball_radius, cell, offset_ns, frame) {
             self.port.publish(Publication::ProbeTouch(touch));
         }
-        let mut result = result_of(target, &probed);
+    }
+
+    fn result(&self, target: &Flag, probed: &FlagResult) -> ProbeResult {
+        let mut result = result_of(target, probed);
         if let Ending::Cancelled(request) = probed.ending
             && let Some((code, why)) = self.link.common.stops.why(request)
         {
@@ -626,6 +573,28 @@ impl ArmWorker {
         result.message += &self.doubts_of_check();
         result
     }
+}
+
+/// The measured feature, unless its probing was broken off.
+///
+/// - `folder`: of the session.
+fn measured(folder: &Path, probed: &FlagResult) -> Option<ArmMeasurement> {
+    let is_whole = matches!(
+        probed.ending,
+        Ending::ToleranceReached
+            | Ending::TouchesSpent
+            | Ending::CalibrationLimits { .. }
+            | Ending::TimeSpent
+    );
+    let found = probed.found.as_ref().filter(|_| is_whole)?;
+    let session = folder.file_name().unwrap_or_default().to_string_lossy();
+    Some(ArmMeasurement {
+        session: session.into_owned(),
+        id: probed.flag,
+        feature: found.feature.clone()?,
+        // a quantity not known well enough stays requested
+        is_done: matches!(probed.ending, Ending::ToleranceReached),
+    })
 }
 
 /// File of touches, beside the recording of a session.

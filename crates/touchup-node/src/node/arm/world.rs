@@ -65,22 +65,16 @@ impl ArmLink {
     /// Publishes a state as a probe does: the pose in the scene's frame of poses, the wrench in the
     /// axes of the probe.
     pub fn publish(&self, state: &ArmState) {
-        let Setup {
-            scene,
-            shared,
-            tool,
-            ..
-        } = &*self.setup;
+        let setup = &*self.setup;
         // base of the arm, if the scene places the scan in it
-        let base = if scene.scan_to_space.is_some() {
-            CELL_FRAME
-        } else {
-            &shared.frame
+        let base = match setup.input.scene.scan_to_space {
+            Some(_) => CELL_FRAME,
+            None => &setup.shared.frame,
         };
         let stamp_ns = state.stamp_ns + self.offset_ns.unwrap_or(0);
         let (pose, wrench) = state.as_probe(stamp_ns);
         self.samples.publish_pose(as_pose(&pose, base));
-        self.samples.publish_wrench(as_wrench(&wrench, tool));
+        self.samples.publish_wrench(as_wrench(&wrench, &setup.tool));
     }
 }
 

@@ -152,7 +152,8 @@ impl Player {
             .map(|name| name.to_string_lossy().into_owned())
             .unwrap_or_default();
         let site = Arc::new(Site {
-            board: Board::new(ready.whole_mesh()),
+            board: Board::default(),
+            mesh: ready.mesh_feed(),
             calls: Calls::new(&inbox).map_err(|error| error.to_string())?,
             inbox: inbox.clone(),
             entrance: Arc::clone(entrance),

@@ -1,14 +1,21 @@
 //! A scan finer than the tip, and its simplified copy for haptic update and live patch.
+//!
+//! The shown mesh is the scan: its faces, moved with the simplified ones, and the faces of the patch
+//! in place of replaced ones. At rest it is the scan with the patch of all touches.
+
+mod at_rest;
+mod followed;
+mod groups;
 
 use std::sync::Arc;
 
+use at_rest::AtRest;
+use followed::{FollowedScan, Scans};
 use touchup_geometry::mesh::{
     Changes, FaceId, FaceTree, MeshError, SimplifiedMesh, TriMesh, VertexId,
 };
 use touchup_method::haptic::{RefineParams, Refiner};
 use touchup_method::reconstruct::{PatchDelta, Support};
-
-use super::shown::{Scans, ShownMesh};
 
 /// A fine scan and its simplified copy.
 #[derive(Debug)]
@@ -18,6 +25,13 @@ pub(super) struct Detail {
     /// present after [`Self::watch`]
     shown: Option<ShownMesh>,
     rests: u64,
+}
+
+/// The shown mesh, and its way to follow the working mesh or to rest.
+#[derive(Debug)]
+struct ShownMesh {
+    followed: FollowedScan,
+    at_rest: AtRest,
 }
 
 /// Owner of the scan.
@@ -86,16 +100,19 @@ impl Detail {
 
     /// Starts the shown mesh.
     pub fn watch(&mut self) {
-        self.shown = Some(ShownMesh::new(self.scans()));
+        self.shown = Some(ShownMesh {
+            followed: FollowedScan::new(self.scans()),
+            at_rest: AtRest::default(),
+        });
     }
 
     /// The shown mesh, as it has followed the working mesh; `None` before [`Self::watch`].
     pub fn shown(&self) -> Option<&TriMesh> {
-        self.shown.as_ref().map(ShownMesh::mesh)
+        self.shown.as_ref().map(|shown| &shown.followed.mesh)
     }
 
     /// Changes of the shown mesh, as [`TriMesh::take_changes`], after it takes over up to `most`
-    /// changes of the working mesh.
+    /// changes of each kind from the working mesh, or at rest from the patch of all touches.
     ///
     /// # Errors
     /// [`MeshError::TooMany`].
@@ -108,28 +125,31 @@ impl Detail {
         let Self {
             scan,
             simplified,
-            shown: Some(shown),
+            shown: Some(ShownMesh { followed, at_rest }),
             ..
         } = self
         else {
             return Ok(true);
         };
-        let has_followed = shown.follow(
-            Scans {
-                original: scan.mesh(),
-                simplified,
-            },
-            refiner,
-            most,
-        )?;
-        Ok(shown.take_changes(most, into) && has_followed)
+        let scans = Scans {
+            original: scan.mesh(),
+            simplified,
+        };
+        let has_gone_on = at_rest.go_on(followed, scans, refiner.mesh(), most)?;
+        let has_followed = if has_gone_on && !at_rest.is_there() {
+            followed.follow(scans, refiner, most)?
+                && !at_rest.begin(followed, scans, refiner.mesh())
+        } else {
+            has_gone_on
+        };
+        Ok(followed.mesh.take_changes(most, into) && has_followed)
     }
 
-    /// Turns the shown mesh into the scan with this patch of all touches, by further calls of
-    /// [`Self::take_changes`].
+    /// Turns the shown mesh into the scan with this patch of all touches, once it has followed the
+    /// working mesh and until that changes, by further calls of [`Self::take_changes`].
     pub fn rest(&mut self, patch: PatchDelta, refiner: &Refiner) {
         if let Some(shown) = &mut self.shown {
-            shown.rest(patch, refiner.mesh());
+            shown.at_rest.want(patch, refiner.mesh());
             self.rests += 1;
         }
     }
@@ -138,7 +158,7 @@ impl Detail {
     pub fn is_resting(&self, refiner: &Refiner) -> bool {
         self.shown
             .as_ref()
-            .is_some_and(|shown| shown.rests(refiner.mesh()))
+            .is_some_and(|shown| shown.at_rest.is_wanted(refiner.mesh()))
     }
 
     /// Number of calls of [`Self::rest`].
@@ -148,12 +168,15 @@ impl Detail {
 
     /// The support of a vertex of the shown mesh; `None` for a vertex of the scan.
     pub fn support(&self, refiner: &Refiner, vertex: VertexId) -> Option<Support> {
-        self.shown.as_ref()?.support(refiner, vertex)
+        let ShownMesh { followed, at_rest } = self.shown.as_ref()?;
+        at_rest
+            .support(vertex)
+            .or_else(|| followed.support(refiner, vertex))
     }
 
     /// A face of the shown mesh that shows a face of the working mesh.
     pub fn face(&self, working: FaceId) -> Option<FaceId> {
-        self.shown.as_ref()?.face(self.scans(), working)
+        self.shown.as_ref()?.followed.face(self.scans(), working)
     }
 
     /// Memory, bytes; without a shared scan, which its owner counts.

@@ -52,7 +52,7 @@ pub(super) struct FollowedScan {
 
 /// A scan and its simplified copy.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::live) struct Scans<'a> {
+pub(super) struct Scans<'a> {
     pub original: &'a TriMesh,
     pub simplified: &'a SimplifiedMesh,
 }
