@@ -14,8 +14,8 @@ use self::alignment::{
 };
 use self::table::CompareReport;
 pub use self::table::comparison_json;
-use super::pictures::{file_name, today, view_from, write_coloured, write_picture};
-use super::progress::WorkProgress;
+use super::common::pictures::{file_name, today, view_from, write_coloured, write_picture};
+use super::common::progress::WorkProgress;
 use super::{CliError, Losses, check_outputs, print_report, require};
 use touchup_features::compare::{
     CompareParams, Comparison, IndexedMesh, PictureLabel, PicturePanel, PictureParams, Regions,

@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde::Serialize;
 
-use super::progress::WorkProgress;
-use super::recorded::RecordedFlags;
+use super::common::progress::WorkProgress;
+use super::common::recorded::RecordedFlags;
 use super::{CliError, Losses, check_kept, check_outputs, check_place, counted, print_report};
 use touchup_io::features_file::read_features;
 use touchup_io::recording::{

@@ -8,20 +8,20 @@ use clap::Args;
 use nalgebra::Point3;
 use serde::Serialize;
 
-use super::arm::RobotName;
+use super::common::arm::RobotName;
+use super::common::found::FoundTable;
+#[cfg(any(feature = "ros", feature = "r2r"))]
+use super::common::page::{on_page, parameters_of};
+use super::common::progress::WorkProgress;
+use super::common::refinement::{RefineSummary, RefinementFiles, RefinementResult};
+use super::common::told::ToldFlags;
+#[cfg(any(feature = "ros", feature = "r2r"))]
+use super::common::web::WebFlags;
 use super::compare::{CompareArguments, compared};
 use super::demo_robot::demo_robot;
-use super::found::FoundTable;
 #[cfg(any(feature = "ros", feature = "r2r"))]
 use super::node::end_text;
-#[cfg(any(feature = "ros", feature = "r2r"))]
-use super::page::{on_page, parameters_of};
-use super::progress::WorkProgress;
-use super::refinement::{RefineSummary, RefinementFiles, RefinementResult};
 use super::simulate::{SimulatedInput, write_simulation};
-use super::told::ToldFlags;
-#[cfg(any(feature = "ros", feature = "r2r"))]
-use super::web::WebFlags;
 use super::{CliError, Losses, print_result, reported, write_json};
 use touchup_features::compare::TouchedRegion;
 use touchup_geometry::mesh::{FaceTree, MeshError, TriMesh};

@@ -11,12 +11,12 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use serde::Serialize;
 
-use super::arm_errors::ArmErrorsName;
 use super::check::{CheckReport, Gates, SPOT_TOUCHES, touched};
+use super::common::arm_errors::ArmErrorsName;
+use super::common::progress::WorkProgress;
+use super::common::signals::StopSignals;
 use super::compare::{CompareArguments, compared};
 use super::probing::{Probing, ProbingOutcome, ProbingSetup, ProbingSummary};
-use super::progress::WorkProgress;
-use super::signals::StopSignals;
 use super::{CliError, Losses, not_written, print_result, reported, write_json};
 use touchup_features::calibrate::ReferenceSphere;
 use touchup_features::features::{Feature, InspectedQuantity};

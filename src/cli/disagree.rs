@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use nalgebra::Vector3;
 
-use super::pictures::{file_name, today, view_from, write_coloured, write_picture};
-use super::progress::WorkProgress;
+use super::common::pictures::{file_name, today, view_from, write_coloured, write_picture};
+use super::common::progress::WorkProgress;
 use super::{CliError, Losses, check_outputs, counted, print_report, reported};
 use touchup_features::compare::{
     BadTouches, Class, Disagreement, DisagreementRegion, IndexedMesh, PicturePanel, PictureParams,

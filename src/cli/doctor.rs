@@ -6,9 +6,9 @@ use std::path::PathBuf;
 use clap::Args;
 use serde::Serialize;
 
-use super::progress::WorkProgress;
-use super::recorded::RecordedFlags;
-use super::told::{ToldFlags, ToldNumbers};
+use super::common::progress::WorkProgress;
+use super::common::recorded::RecordedFlags;
+use super::common::told::{ToldFlags, ToldNumbers};
 use super::{CliError, Losses, print_report};
 use touchup_features::diagnose::InputFinding;
 use touchup_io::mesh_file::MeshUnit;

@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 
-use super::progress::WorkProgress;
+use super::common::progress::WorkProgress;
 use super::{CliError, Losses, check_kept, counted, print_report, require};
 use touchup_features::features::clusters::{
     Cluster, ClusterParams, PaperParams, clusters, paper_clusters,

@@ -4,64 +4,46 @@
 //! 1 result not written, 2 wrong usage, 3 bad input file, 4 done with losses, which are named, 5
 //! the arm stopped, 130 stopped by a signal. With `--json` an error is one object on stderr.
 
-mod arm;
-mod arm_errors;
-#[cfg(any(feature = "ros", feature = "r2r"))]
-mod begin;
 mod calibrate;
 mod check;
+mod common;
 mod compare;
 mod convert;
 mod demo;
 mod demo_robot;
 mod disagree;
 mod doctor;
-mod error;
 mod features;
-mod found;
 mod init;
 mod inspect;
 #[cfg(any(feature = "ros", feature = "r2r"))]
 mod node;
-mod output;
-#[cfg(any(feature = "ros", feature = "r2r"))]
-mod page;
-#[cfg(any(feature = "ros", feature = "r2r"))]
-mod path_parameter;
-mod pictures;
 mod probe;
 mod probing;
-mod progress;
-mod recorded;
 mod recover;
 mod refine;
-mod refinement;
 #[cfg(any(feature = "ros", feature = "r2r"))]
 mod replay;
 mod report;
-#[cfg(feature = "web")]
-mod set_up;
-mod signals;
 mod simulate;
 mod simulated_world;
 mod step;
 mod sweep;
-mod told;
 #[cfg(feature = "ur")]
 mod ur;
-#[cfg(any(feature = "ros", feature = "r2r"))]
-mod web;
 mod whatif;
 
+pub use common::error::CliError;
 pub use compare::comparison_json;
-pub use error::CliError;
 pub use simulate::{ScannerKind, Side, Simulation, SimulationSettings};
 pub use simulated_world::OffFactor;
 pub use sweep::plan_sweep;
 pub use whatif::what_if_json;
 
-use error::{Losses, asks_for_json, print_error, print_parse_error, require, require_positive};
-use output::{
+use common::error::{
+    Losses, asks_for_json, print_error, print_parse_error, require, require_positive,
+};
+use common::output::{
     by_reason, check_kept, check_kept_by, check_outputs, check_place, not_written, notify,
     notify_with_code, print_report, print_result, write_json,
 };

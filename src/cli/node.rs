@@ -5,12 +5,12 @@ use std::sync::Arc;
 
 use clap::Args;
 
-use super::arm::{connect_ur, ros2_control_arm};
-use super::begin::BeginError;
-use super::path_parameter::path;
-use super::signals::SignalledNode;
-use super::told::{ToldBy, ToldNumbers};
-use super::web::WebFlags;
+use super::common::arm::{connect_ur, ros2_control_arm};
+use super::common::begin::BeginError;
+use super::common::path_parameter::path;
+use super::common::signals::SignalledNode;
+use super::common::told::{ToldBy, ToldNumbers};
+use super::common::web::WebFlags;
 use super::{
     CliError, Losses, by_reason, counted, print_report, print_result, require, require_positive,
 };

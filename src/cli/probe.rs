@@ -7,10 +7,10 @@ use clap::Args;
 use nalgebra::Point3;
 use serde::Serialize;
 
-use super::arm::{ArmArguments, RobotName};
+use super::common::arm::{ArmArguments, RobotName};
+use super::common::signals::StopSignals;
+use super::common::told::ToldNumbers;
 use super::probing::{Probing, ProbingOutcome, ProbingSetup, flag_of, goals_of, millimetres};
-use super::signals::StopSignals;
-use super::told::ToldNumbers;
 use super::{CliError, Losses, counted, print_report, reported, require, require_positive};
 use touchup_features::conformity::DecisionParams;
 use touchup_probing::arm::{Arm, RequestLimits};

@@ -8,8 +8,8 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use serde::Serialize;
 
-use super::progress::WorkProgress;
-use super::recorded::RecordedFlags;
+use super::common::progress::WorkProgress;
+use super::common::recorded::RecordedFlags;
 use super::{CliError, Losses, counted, notify, print_report};
 use touchup_io::recording::StampSource;
 use touchup_method::stylus::MarkerFilter;

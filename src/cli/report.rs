@@ -6,7 +6,7 @@ use std::process::Command;
 
 use clap::Args;
 
-use super::error::{CliError, Losses};
+use super::common::error::{CliError, Losses};
 
 const MISSING: &str = "touchup-report is neither beside this program nor on the path: `cargo install --locked --path crates/touchup-report` in \
      touchup's folder puts it there, `cargo run --release -p touchup-report -- --out out` does without";

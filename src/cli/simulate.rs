@@ -9,7 +9,7 @@ use clap::{Args, ValueEnum};
 use nalgebra::{Unit, Vector3};
 use tracing::warn;
 
-use super::progress::WorkProgress;
+use super::common::progress::WorkProgress;
 use super::simulated_world::{OffFactor, world_named, write_told_scene, write_truth};
 use super::{CliError, Losses, check_kept, not_written, print_result, require};
 use touchup_geometry::mesh::TriMesh;

@@ -6,7 +6,7 @@ use std::str::FromStr;
 use serde_json::{Value, json};
 
 use super::CliError;
-use super::output::write_json;
+use super::common::output::write_json;
 use touchup_io::atomic::write_atomically;
 use touchup_sim::{DrawnValue, DrawnWorld, SimWorld, ToldOff};
 

@@ -87,7 +87,7 @@ const HALF: i32 = 10;
 const RADIUS: f64 = 1.5e-3;
 
 /// All that is said of the one touch of [`Case`].
-const FEW: &str = " WARN touchup::cli::refinement: perhaps: only 1 place of the part was touched; touch more of it: so few fit almost anywhere, \
+const FEW: &str = " WARN touchup::cli::common::refinement: perhaps: only 1 place of the part was touched; touch more of it: so few fit almost anywhere, \
                    and nothing can be said of poses, tip and clock\n";
 
 /// The error of a command, behind its warnings.

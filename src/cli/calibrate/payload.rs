@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
-use super::super::arm::{CellArguments, Measurement, RobotName, TruePayload};
+use super::super::common::arm::{CellArguments, Measurement, RobotName, TruePayload};
 use super::super::probing::KeptMeasurements;
 use super::super::{CliError, Losses, require};
 use super::{CalibrationTarget, RecordingFlags};

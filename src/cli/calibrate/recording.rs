@@ -5,8 +5,8 @@ use std::path::Path;
 use clap::Args;
 
 use crate::cli::CliError;
-use crate::cli::progress::WorkProgress;
-use crate::cli::recorded::RecordedFlags;
+use crate::cli::common::progress::WorkProgress;
+use crate::cli::common::recorded::RecordedFlags;
 use touchup_session::calibration::{CalibrationError, CalibrationRecording};
 use touchup_session::scene::Scene;
 

@@ -2,8 +2,8 @@
 
 use clap::Args;
 
-use super::super::arm::{ArmArguments, TouchesOutput};
 use super::super::check::repeated;
+use super::super::common::arm::{ArmArguments, TouchesOutput};
 use super::super::{CliError, Losses};
 use super::CalibrationTarget;
 use touchup_session::calibration::{Calibration, StiffnessFound};

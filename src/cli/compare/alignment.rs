@@ -7,7 +7,7 @@ use nalgebra::{Isometry3, Vector3};
 use serde::Serialize;
 use tracing::warn;
 
-use crate::cli::progress::WorkProgress;
+use crate::cli::common::progress::WorkProgress;
 use crate::cli::{CliError, counted, print_report, reported};
 use touchup_features::align::{
     Alternative, FeaturesError, FeaturesParams, FreeTurn, IcpFit, IcpMotion, IcpParams,

@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use crate::cli::pictures::view_from;
-use crate::cli::progress::WorkProgress;
+use crate::cli::common::pictures::view_from;
+use crate::cli::common::progress::WorkProgress;
 use crate::cli::{CliError, check_outputs};
 use touchup_features::conformity::{DecisionParams, DecisionRule, GeneralTolerance};
 use touchup_inspect::{

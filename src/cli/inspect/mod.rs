@@ -7,8 +7,8 @@ mod summary;
 mod template;
 
 pub(super) use self::arguments::InspectArguments;
-use super::pictures::view_from;
-use super::progress::WorkProgress;
+use super::common::pictures::view_from;
+use super::common::progress::WorkProgress;
 use super::{CliError, Losses, print_report};
 use touchup_inspect::{Inspection, InspectionSource, PartDrawing, PartPicture, inspected};
 

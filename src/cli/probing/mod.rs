@@ -14,11 +14,11 @@ use std::path::Path;
 
 use nalgebra::{Point3, Vector3};
 
-use super::progress::WorkProgress;
-use super::recorded::RecordedFlags;
-use super::refinement::{RefineSummary, RefinementFiles, RefinementResult};
-use super::signals::StopSignals;
-use super::told::ToldFlags;
+use super::common::progress::WorkProgress;
+use super::common::recorded::RecordedFlags;
+use super::common::refinement::{RefineSummary, RefinementFiles, RefinementResult};
+use super::common::signals::StopSignals;
+use super::common::told::ToldFlags;
 use super::{CliError, Losses, not_written};
 use files::{RECORDING, TOUCHES, probe_topics};
 use folder::{ProbingFolder, ProbingRequest};

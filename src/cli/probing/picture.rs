@@ -4,7 +4,7 @@ use std::path::Path;
 
 use nalgebra::{Point3, Vector3};
 
-use crate::cli::pictures::write_picture;
+use crate::cli::common::pictures::write_picture;
 use crate::cli::{CliError, counted};
 use touchup_features::compare::{DrawnMesh, PicturePanel, PictureParams, Rgb};
 use touchup_geometry::mesh::TriMesh;

@@ -6,8 +6,8 @@ use std::time::SystemTime;
 use nalgebra::{Isometry3, Point3};
 use tracing::info;
 
-use crate::cli::arm_errors::ArmErrorsName;
-use crate::cli::told::{ToldFlags, ToldNumbers};
+use crate::cli::common::arm_errors::ArmErrorsName;
+use crate::cli::common::told::{ToldFlags, ToldNumbers};
 use crate::cli::{CliError, require};
 use touchup_features::calibrate::{ReferenceSphere, beside_spheres};
 use touchup_geometry::mesh::TriMesh;

@@ -5,8 +5,8 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use crate::cli::refinement::RefineSummary;
-use crate::cli::told::ToldNumbers;
+use crate::cli::common::refinement::RefineSummary;
+use crate::cli::common::told::ToldNumbers;
 use crate::cli::{counted, reported};
 use touchup_features::conformity::Decision;
 use touchup_features::features::{FeatureKind, InspectedQuantity};

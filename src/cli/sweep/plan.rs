@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::super::progress::WorkProgress;
+use super::super::common::progress::WorkProgress;
 use super::super::{CliError, Losses, check_kept, check_place, counted, not_written, print_result};
 use touchup_io::atomic::AtomicFile;
 use touchup_session::sweep::{JobsFile, SweepPlan};

@@ -6,8 +6,8 @@ use clap::Args;
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use super::super::error::UNSOUND;
-use super::super::progress::WorkProgress;
+use super::super::common::error::UNSOUND;
+use super::super::common::progress::WorkProgress;
 use super::super::{CliError, Losses, counted, print_report, print_result};
 use super::places::results_of;
 use touchup_session::sweep::{GivenInput, JobReport, JobRunner, JobsFile, SweepError};

@@ -12,7 +12,7 @@ use self::page::page;
 use self::report::WhatIfReport;
 pub use self::report::what_if_json;
 use self::tables::{features_table, vertices_table, write_moved_mesh};
-use super::progress::WorkProgress;
+use super::common::progress::WorkProgress;
 use super::sweep::{check_table, results_of};
 use super::{CliError, Losses, check_kept_by, check_outputs, not_written, print_report, require};
 use touchup_session::sweep::{JobResult, JobsFile, WhatIf};

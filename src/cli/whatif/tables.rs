@@ -5,7 +5,7 @@ use std::path::Path;
 use serde_json::Value;
 
 use super::super::CliError;
-use super::super::pictures::write_coloured;
+use super::super::common::pictures::write_coloured;
 use super::page::colour_at;
 use super::report::vertices_of;
 use touchup_features::compare::{Displacement, Rgb};

@@ -6,13 +6,13 @@ use std::collections::BTreeMap;
 
 /// Names of types with two definitions or more.
 const HOMONYMS: Bound = Bound {
-    today: 60,
+    today: 15,
     wanted: 15,
 };
 
 /// Types that are named by no noun.
 const NO_NOUNS: Bound = Bound {
-    today: 125,
+    today: 0,
     wanted: 0,
 };
 

@@ -15,7 +15,7 @@ const LONG_FUNCTIONS: Bound = Bound {
 
 /// Folders with more than [`MOST_FILES`] directly in them.
 const FLAT_FOLDERS: Bound = Bound {
-    today: 9,
+    today: 5,
     wanted: 0,
 };
 

@@ -3,8 +3,10 @@
 use std::path::Path;
 
 use super::mcap_files::writer::not_written;
-use super::{Record, RecordingError, RecordingReader, RecordingWriter, Topics};
+use super::{RecordingReader, RecordingWriter, Topics};
 use crate::atomic::AtomicFile;
+use crate::recording::error::RecordingError;
+use crate::recording::record::Record;
 use touchup_method::stylus::Message;
 
 /// Frame of messages without one; the same for poses and wrenches, which then share their axes.

@@ -17,10 +17,14 @@ use tempfile::NamedTempFile;
 use super::mcap_files::framing::NameBytes;
 use super::messages::wire::MAX_MESSAGE_BYTES;
 use super::topics::check_topic;
-use super::{
-    Damage, FilePlace, MessageFormat, RawMessage, RecordingError, RecordingFile, RecordingLayout,
-    TopicInfo, TopicKind,
-};
+use super::{FilePlace, RecordingLayout};
+use crate::recording::error::Damage;
+use crate::recording::error::RecordingError;
+use crate::recording::layout::TopicInfo;
+use crate::recording::layout::TopicKind;
+use crate::recording::messages::message_type::MessageFormat;
+use crate::recording::recording_file::RawMessage;
+use crate::recording::recording_file::RecordingFile;
 
 pub(super) const MAGIC: [u8; 16] = *b"SQLite format 3\0";
 /// Rows fetched at a time.

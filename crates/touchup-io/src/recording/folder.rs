@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use super::RecordingError;
-use super::mcap_files::segments::{METADATA, segments_of};
+use super::segments::{METADATA, segments_of};
 
 /// Longest `metadata.yaml`: thousands of files and topics.
 const MAX_METADATA_BYTES: u64 = 16 << 20;

@@ -3,13 +3,18 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::path::Path;
 
+use super::FilePlace;
 use super::error::BadCount;
 use super::messages::cdr::unpack;
 use super::messages::decode::{MessageContent, decode};
 use super::messages::transforms::TransformChain;
 use super::messages::wire::WireFormat;
 use super::tables::number_table::TableRow;
-use super::{BadMessage, FilePlace, RawMessage, Record, StampSource, TopicKind};
+use crate::recording::error::BadMessage;
+use crate::recording::layout::TopicKind;
+use crate::recording::record::Record;
+use crate::recording::record::StampSource;
+use crate::recording::recording_file::RawMessage;
 use touchup_method::stylus::Message;
 
 /// Decodes messages, and counts frames and unusable messages.

@@ -4,11 +4,14 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
+use super::RecordingLayout;
 use super::bags::bag::BagReader;
 use super::bags::bag_index;
 use super::db3::{self, Db3Reader};
 use super::mcap_files::mcap::{self, McapReader};
-use super::{RecordingError, RecordingFile, RecordingLayout, ZSTD_MAGIC};
+use crate::recording::compression::ZSTD_MAGIC;
+use crate::recording::error::RecordingError;
+use crate::recording::recording_file::RecordingFile;
 
 const ROS1_MAGIC: &[u8] = b"#ROSBAG V";
 

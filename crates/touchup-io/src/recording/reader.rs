@@ -4,13 +4,18 @@ use std::collections::{BTreeMap, VecDeque};
 use std::iter::FusedIterator;
 use std::path::{Path, PathBuf};
 
+use super::RecordingLayout;
 use super::error::BadCount;
 use super::folder::files_of;
 use super::intake::Intake;
 use super::opening::open_file;
 use super::tables::columns::WrenchAxes;
 use super::tables::number_table::{NumberTable, is_table};
-use super::{BadMessage, Record, RecordingError, RecordingFile, RecordingLayout, StampSource};
+use crate::recording::error::BadMessage;
+use crate::recording::error::RecordingError;
+use crate::recording::record::Record;
+use crate::recording::record::StampSource;
+use crate::recording::recording_file::RecordingFile;
 use touchup_geometry::numeric::counted;
 use touchup_method::stylus::Message;
 

@@ -8,8 +8,8 @@ use nalgebra::{Point3, Vector3};
 
 use super::channels::{FeatureInput, LastTip, ViewInput};
 use super::refinement::RefinementWorker;
-use super::tiles::ColourBy;
-use super::view::colour_by;
+use super::viewing::tiles::ColourBy;
+use super::viewing::view::colour_by;
 use crate::ros::convert::{header, point, vector};
 use crate::ros::mesh_feed::Edits;
 use crate::ros::messages::HapticMismatch;

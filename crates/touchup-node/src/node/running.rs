@@ -13,7 +13,7 @@ use super::refinement::RefinementWorker;
 use super::session::{NodeEnd, NodeSession};
 use super::setup::Setup;
 use super::side_work::{begin, begin_behind};
-use super::view::ViewWorker;
+use super::viewing::view::ViewWorker;
 use crate::ros::inbox::Arrivals;
 use crate::ros::mesh_feed::{Edits, MeshFeed};
 use crate::ros::parameters::{ParameterValue, Parameters};

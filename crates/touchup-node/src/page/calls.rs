@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex};
 
 use serde_json::{Map, Value};
 
-use super::access::Role;
+use super::admission::access::Role;
 use crate::ros::RosError;
 use crate::ros::inbox::Inbox;
 use crate::ros::locked;

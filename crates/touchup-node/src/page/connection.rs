@@ -14,7 +14,7 @@ use tokio::sync::mpsc::{Receiver, Sender, channel};
 use tokio::sync::watch;
 use tokio::time::{MissedTickBehavior, interval, timeout};
 
-use super::access::Role;
+use super::admission::access::Role;
 use super::board::{MeshState, text_of};
 use super::site::Site;
 use crate::ros::messages::MeshPatch;

@@ -15,13 +15,13 @@ use axum::{Extension, Router};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-use super::access::Role;
+use super::admission::access::Role;
+use super::admission::entrance::{self, as_json, refusal};
 use super::connection;
 use super::downloads::{body_of, sessions};
-use super::entrance::{self, as_json, refusal};
 use super::page_place::PagePlace;
 use super::replay::{self, Replays};
-use super::reports;
+use super::reporting::reports;
 use super::site::Site;
 
 /// Maximum size of a message from a page, bytes.

@@ -4,27 +4,21 @@
 //! One thread serves all pages, which follow the feed of the mesh. The node only stores other news
 //! under a lock, for the time of a message copy: a slow page skips states and delays nobody.
 
-mod access;
+mod admission;
 mod annotations;
 mod background;
 mod board;
 mod calls;
 mod connection;
 mod downloads;
-mod entrance;
 mod error;
 mod http;
 mod knowledge;
-mod listener;
-mod nominal;
-mod own_addresses;
 mod page;
 mod page_place;
 mod page_port;
 mod replay;
-mod report_request;
-mod report_work;
-mod reports;
+mod reporting;
 mod setup;
 mod site;
 mod vertex_numbers;
@@ -41,20 +35,20 @@ use tokio::net::TcpListener;
 use tokio::runtime::Handle;
 use tokio::sync::Notify;
 
-use self::access::Access;
-pub use self::access::Role;
+use self::admission::access::Access;
+pub use self::admission::access::Role;
+use self::admission::entrance::Entrance;
+pub use self::admission::entrance::Invitation;
+pub use self::admission::listener::Certificate;
+use self::admission::listener::Routes;
 use self::annotations::Annotations;
 use self::board::Board;
 use self::calls::Calls;
-use self::entrance::Entrance;
-pub use self::entrance::Invitation;
 pub use self::error::WebError;
-pub use self::listener::Certificate;
-use self::listener::Routes;
-use self::nominal::Nominal;
 use self::page_port::PagePort;
 use self::replay::Replays;
-use self::report_work::Reports;
+use self::reporting::nominal::Nominal;
+use self::reporting::report_work::Reports;
 pub use self::setup::{NodeSetup, SetupParams, SetupStep};
 use self::site::{ScanShown, Site};
 use crate::ros::inbox::Inbox;
@@ -142,10 +136,10 @@ impl WebServer {
                 .collect::<io::Result<_>>()?,
             false => Vec::new(),
         };
-        let checked = from_fn_with_state(Arc::clone(&entrance), entrance::check);
+        let checked = from_fn_with_state(Arc::clone(&entrance), admission::entrance::check);
         let routes = Routes::new(
-            entrance::routes(&entrance)
-                .fallback(entrance::nothing)
+            admission::entrance::routes(&entrance)
+                .fallback(admission::entrance::nothing)
                 .layer(checked),
         );
         let (stop, handle) = (Arc::new(Notify::new()), runtime.handle().clone());
@@ -153,7 +147,7 @@ impl WebServer {
         let serve = move || {
             runtime.block_on(async {
                 tokio::select! {
-                    () = listener::serve(listener, tls, served) => {}
+                    () = admission::listener::serve(listener, tls, served) => {}
                     () = stopped.notified() => {}
                 }
             });

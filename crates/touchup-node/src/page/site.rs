@@ -7,14 +7,14 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use super::access::Role;
+use super::admission::access::Role;
+use super::admission::entrance::Entrance;
 use super::annotations::{AnnotateRequest, Annotations};
 use super::board::Board;
 use super::calls::{CallReply, Calls, MAY_ONLY_LOOK};
-use super::entrance::Entrance;
-use super::nominal::Nominal;
 use super::replay::ReplayControl;
-use super::report_work::Reports;
+use super::reporting::nominal::Nominal;
+use super::reporting::report_work::Reports;
 use crate::ros::inbox::Inbox;
 use crate::ros::mesh_feed::MeshFeed;
 use crate::ros::stop::ArmMotion;

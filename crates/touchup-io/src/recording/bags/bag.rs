@@ -11,12 +11,16 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use super::bag_index::{BagIndex, Connections, LENGTH_BYTES, MAGIC, RecordHeader, op};
+use crate::recording::error::Damage;
+use crate::recording::error::RecordingError;
+use crate::recording::layout::TopicInfo;
+use crate::recording::layout::TopicKind;
 use crate::recording::mcap_files::framing::{ByteStream, Fields, check_length};
+use crate::recording::messages::message_type::MessageFormat;
+use crate::recording::recording_file::RawMessage;
+use crate::recording::recording_file::RecordingFile;
 use crate::recording::topics::check_topic;
-use crate::recording::{
-    Damage, FilePlace, MessageFormat, RawMessage, RecordingError, RecordingFile, RecordingLayout,
-    TopicInfo, TopicKind,
-};
+use crate::recording::{FilePlace, RecordingLayout};
 
 /// Topic and its format, place of the payload in the records, log time, ns.
 type BagMessage = (TopicKind, MessageFormat, Range<usize>, i64);

@@ -16,11 +16,15 @@ use std::path::{Path, PathBuf};
 use super::framing::{
     ByteStream, Fields, HEAD_BYTES, NameBytes, check_crc, check_length, op, split_record,
 };
+use crate::recording::error::Damage;
+use crate::recording::error::RecordingError;
+use crate::recording::layout::TopicInfo;
+use crate::recording::layout::TopicKind;
+use crate::recording::messages::message_type::MessageFormat;
+use crate::recording::recording_file::RawMessage;
+use crate::recording::recording_file::RecordingFile;
 use crate::recording::topics::check_topic;
-use crate::recording::{
-    Damage, FilePlace, MessageFormat, RawMessage, RecordingError, RecordingFile, RecordingLayout,
-    TopicInfo, TopicKind,
-};
+use crate::recording::{FilePlace, RecordingLayout};
 
 pub(in crate::recording) const MAGIC: [u8; 8] = *b"\x89MCAP0\r\n";
 /// Footer record and the magic behind it.

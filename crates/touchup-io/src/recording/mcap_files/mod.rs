@@ -2,6 +2,4 @@
 
 pub mod framing;
 pub mod mcap;
-pub mod resume;
-pub mod segments;
 pub mod writer;

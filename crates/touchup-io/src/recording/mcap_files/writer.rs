@@ -10,9 +10,12 @@ use ::mcap::{Compression, McapError, WriteOptions};
 
 use crate::atomic::AtomicFile;
 use crate::file_error::FileError;
+use crate::recording::Topics;
+use crate::recording::error::RecordingError;
+use crate::recording::layout::TopicKind;
 use crate::recording::messages::cdr::{encode_pose, encode_wrench};
 use crate::recording::messages::point_cloud::{POINT_CLOUD, POINT_FIELD, encode_markers};
-use crate::recording::{Record, RecordingError, TopicKind, Topics};
+use crate::recording::record::Record;
 use touchup_method::stylus::Message;
 
 /// Separator in message definitions in rosbag2's form: the type, then each type it uses behind a

@@ -7,7 +7,9 @@ use byteorder::{BigEndian, LittleEndian};
 use serde::{Deserialize, Serialize};
 
 use super::wire::MAX_MESSAGE_BYTES;
-use crate::recording::{BadMessage, RecordingError, ZSTD_MAGIC};
+use crate::recording::compression::ZSTD_MAGIC;
+use crate::recording::error::BadMessage;
+use crate::recording::error::RecordingError;
 use touchup_method::stylus::{StampedPose, StampedWrench};
 
 /// Maximum padding of serialized payloads, to four bytes by some middlewares; more means another

@@ -6,7 +6,8 @@ use super::franka::{FrankaSample, franka_robot_state, franka_state};
 use super::message_type::{MessageFormat, MessageType};
 use super::point_cloud;
 use super::wire::{MessageFields, RosHeader, WireReader};
-use crate::recording::{BadMessage, Record};
+use crate::recording::error::BadMessage;
+use crate::recording::record::Record;
 use touchup_method::stylus::{FrameTransform, Message, StampedPose, StampedWrench};
 
 /// Content of a message.

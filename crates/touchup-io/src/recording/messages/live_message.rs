@@ -7,8 +7,9 @@ use serde::de::{DeserializeSeed, Deserializer, SeqAccess, Visitor};
 use super::decode::{MessageContent, decode, decode_fields};
 use super::message_type::{MessageFormat, MessageType};
 use super::wire::{MAX_MESSAGE_BYTES, SequenceFields, WireFormat};
+use crate::recording::error::BadMessage;
 use crate::recording::layout::TopicKind;
-use crate::recording::{BadMessage, Record};
+use crate::recording::record::Record;
 use touchup_method::stylus::Message;
 
 /// Content of a topic.

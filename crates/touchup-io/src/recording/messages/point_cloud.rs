@@ -10,7 +10,8 @@ use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
 
 use super::cdr::{HeaderMsg, decode, encode};
-use crate::recording::{BadMessage, RecordingError};
+use crate::recording::error::BadMessage;
+use crate::recording::error::RecordingError;
 use crate::scalar::Scalar;
 use touchup_method::stylus::{MarkerFrame, MarkerObservation};
 

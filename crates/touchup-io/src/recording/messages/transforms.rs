@@ -8,7 +8,9 @@ use std::path::Path;
 
 use nalgebra::Isometry3;
 
-use crate::recording::{BadMessage, RecordingError, TransformFrames};
+use crate::recording::TransformFrames;
+use crate::recording::error::BadMessage;
+use crate::recording::error::RecordingError;
 use touchup_method::stylus::{FrameBuffer, FrameTransform, MovingFrame, StampedPose};
 
 /// Frames of a tree: an arm has ten, a plant some hundred.

@@ -5,8 +5,11 @@ use super::super::messages::decode::MessageContent;
 use super::super::messages::transforms::TransformTree;
 use super::super::opening::open_file;
 use super::super::topics::check_topics;
-use super::super::{RecordingError, RecordingFile, TopicInfo, TopicKind, TransformFrames};
+use super::super::{RecordingError, TransformFrames};
 use super::RecordingReader;
+use crate::recording::layout::TopicInfo;
+use crate::recording::layout::TopicKind;
+use crate::recording::recording_file::RecordingFile;
 
 impl RecordingReader {
     /// Looks into every file once: topics, counts, missing ends. Returns the first, still open: it

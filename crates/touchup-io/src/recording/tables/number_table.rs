@@ -10,7 +10,10 @@ use std::path::{Path, PathBuf};
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
 
 use super::columns::{FoundColumns, OrientationColumns, ScaledColumn, TableColumns, WrenchAxes};
-use crate::recording::{BadMessage, Damage, FilePlace, RecordingError};
+use crate::recording::FilePlace;
+use crate::recording::error::BadMessage;
+use crate::recording::error::Damage;
+use crate::recording::error::RecordingError;
 use crate::table_rows::{DecimalSign, MAX_ROW_BYTES, RowError, TableRows};
 use touchup_method::stylus::{StampedPose, StampedWrench, Wrench, measured_rotation};
 

@@ -8,7 +8,7 @@ use tokio::time::timeout;
 
 use super::replays::{Replay, Replays};
 use super::shown::ReplayShown;
-use crate::page::access::Role;
+use crate::page::admission::access::Role;
 use crate::page::board::text_of;
 use crate::page::connection;
 use crate::page::page_place::PagePlace;

@@ -11,8 +11,8 @@ use tokio::time::timeout;
 
 use super::control::ReplayControl;
 use super::player::{OpenedReplay, Player};
+use crate::page::admission::entrance::Entrance;
 use crate::page::background;
-use crate::page::entrance::Entrance;
 use crate::ros::locked;
 use touchup_io::session_folder::SessionFolder;
 use touchup_session::clock::Clock;

@@ -7,7 +7,7 @@ use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use super::scene_draft::SceneDraft;
 use super::setup_shown::{CalibrationChoice, SetupFailure, SetupShown, SetupStage, SetupStep};
 use super::setup_state::{NodeSetupError, SetupState};
-use crate::page::access::Role;
+use crate::page::admission::access::Role;
 use crate::page::error::WebError;
 use crate::ros::locked;
 use touchup_io::atomic::is_same_file;

@@ -20,9 +20,9 @@ use super::node_setup::NodeSetup;
 use super::scene_draft::StatedTip;
 use super::setup_state::NodeSetupError;
 use super::upload;
-use crate::page::access::Role;
+use crate::page::admission::access::Role;
+use crate::page::admission::entrance::{self, Entrance, as_json, refusal};
 use crate::page::calls::MAY_ONLY_LOOK;
-use crate::page::entrance::{self, Entrance, as_json, refusal};
 use touchup_io::mesh_file::MeshUnit;
 use touchup_session::calibration::CalibrationKind;
 

@@ -6,7 +6,7 @@ use super::facts::ScanFacts;
 use super::found_calibration::FoundCalibration;
 use super::recording_check::CheckFacts;
 use super::scene_draft::{NamedCalibrations, StatedTip};
-use crate::page::access::Role;
+use crate::page::admission::access::Role;
 use touchup_io::scan_folder::FolderFile;
 use touchup_session::calibration::CalibrationKind;
 

@@ -252,7 +252,7 @@ fn a_state_of_a_franka_gives_the_tool_and_the_wrench_in_the_base() {
 #[test]
 fn what_gives_no_pose_is_refused_with_what_does_and_the_flag() {
     let of = |type_name: &str, kind| {
-        let info = crate::recording::TopicInfo {
+        let info = crate::recording::layout::TopicInfo {
             name: "/a".into(),
             type_name: type_name.into(),
             encoding: "cdr".into(),

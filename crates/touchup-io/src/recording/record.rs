@@ -1,0 +1,49 @@
+//! One entry of a recording, and the source of its time.
+
+use touchup_method::stylus::{MarkerFrame, Message};
+
+/// One entry of a recording.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Record {
+    /// A pose or a wrench.
+    Message(Message),
+    /// The markers seen at one instant.
+    Markers(Box<MarkerFrame>),
+}
+
+impl From<Message> for Record {
+    fn from(message: Message) -> Self {
+        Self::Message(message)
+    }
+}
+
+impl Record {
+    /// Time of measurement, ns.
+    pub fn stamp_ns(&self) -> i64 {
+        match self {
+            Self::Message(message) => message.stamp_ns(),
+            Self::Markers(frame) => frame.stamp_ns,
+        }
+    }
+
+    pub(super) fn set_stamp(&mut self, stamp: i64) {
+        match self {
+            Self::Message(Message::Pose(pose)) => pose.stamp_ns = stamp,
+            Self::Message(Message::Wrench(wrench)) => wrench.stamp_ns = stamp,
+            Self::Markers(frame) => frame.stamp_ns = stamp,
+        }
+    }
+}
+
+touchup_method::names! {
+    /// Source of a message's time of measurement.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+    pub enum StampSource {
+        /// The stamp of its header.
+        #[default]
+        Header = "header",
+        /// When the recorder took it: for headers without a stamp, or of clocks that have nothing
+        /// in common. Both streams are as late then as their way to the recorder was long.
+        Log = "log",
+    }
+}

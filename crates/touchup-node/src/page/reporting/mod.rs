@@ -1,0 +1,6 @@
+//! Inspection reports of a session on the page.
+
+pub mod nominal;
+pub mod report_request;
+pub mod report_work;
+pub mod reports;

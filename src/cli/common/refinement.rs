@@ -1,0 +1,228 @@
+//! Refinement from files to files, for all refining verbs.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use serde::Serialize;
+use tracing::warn;
+
+use super::progress::WorkProgress;
+use super::told::ToldNumbers;
+use crate::cli::{CliError, Losses, by_reason};
+use touchup_geometry::mesh::RepairReport;
+use touchup_io::mesh_file::MeshUnit;
+use touchup_method::reconstruct::CloudSummary;
+use touchup_session::live::Quantiles;
+use touchup_session::refinement::{
+    InputNames, OpenedInput, RefinedScan, Refinement, RefinementOptions, RefinementSummary,
+};
+use touchup_session::replay::RecordedAs;
+use touchup_session::scene::{LeftOut, Memory, Scene, SceneCost};
+use touchup_session::session::OutcomePlaces;
+
+/// Input and output files of a refinement.
+#[derive(Clone, Debug)]
+pub(in crate::cli) struct RefinementFiles {
+    pub scan: PathBuf,
+    /// Unit of the scan and of the refined mesh.
+    pub mesh_unit: MeshUnit,
+    pub recording: PathBuf,
+    pub recorded: RecordedAs,
+    pub mesh_out: PathBuf,
+    pub features_out: Option<PathBuf>,
+    pub touches_out: Option<PathBuf>,
+}
+
+/// Output of `--json`; times in s.
+#[derive(Debug, Serialize)]
+pub(in crate::cli) struct RefineSummary {
+    /// Stages built from the scene, omitted ones with reasons, and the memory at start.
+    scene: SceneCost,
+    /// Numbers of tip and scan, and their sources.
+    told: ToldNumbers,
+    /// Origin of the scan in a point cloud; absent for a mesh.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    cloud: Option<CloudSummary>,
+    #[serde(flatten)]
+    refinement: RefinementSummary,
+    load_s: f64,
+    replay_s: f64,
+}
+
+/// Result of refining a scan.
+pub(in crate::cli) struct RefinementResult {
+    /// Repairs of the scan's file.
+    pub repair: RepairReport,
+    pub summary: RefineSummary,
+    pub losses: Losses,
+}
+
+impl RefinementFiles {
+    /// Writes refined.ply, features.json and touches.csv into the folder of the recording.
+    ///
+    /// - `recording`: its name in `folder`.
+    pub fn in_folder(
+        scan: &Path,
+        mesh_unit: MeshUnit,
+        folder: &Path,
+        recording: &str,
+        recorded: RecordedAs,
+    ) -> Self {
+        Self {
+            scan: scan.to_owned(),
+            mesh_unit,
+            recording: folder.join(recording),
+            recorded,
+            mesh_out: folder.join("refined.ply"),
+            features_out: Some(folder.join("features.json")),
+            touches_out: Some(folder.join("touches.csv")),
+        }
+    }
+
+    /// Reads scan and recording, refines, and writes mesh, features and touches.
+    ///
+    /// - `told`: sources of the numbers in `scene`.
+    pub fn refine(
+        &self,
+        scene: Scene,
+        told: ToldNumbers,
+        options: RefinementOptions,
+    ) -> Result<RefinementResult, CliError> {
+        let started = Instant::now();
+        let OpenedInput {
+            input,
+            repair,
+            cloud,
+            recording,
+            markers,
+        } = OpenedInput::open(
+            scene,
+            (&self.scan, self.mesh_unit),
+            (&self.recording, &self.recorded),
+        )?;
+        let mut refinement = Refinement::new(input, recording.wrench_frame, options)?;
+        let load_s = started.elapsed().as_secs_f64();
+        let scene = self.cost(&refinement);
+
+        let started = Instant::now();
+        let mut progress = WorkProgress::new("replay", recording.message_count());
+        refinement.replay(recording, markers, &mut || progress.step())?;
+        drop(progress);
+        let replay_s = started.elapsed().as_secs_f64();
+        let stage = WorkProgress::stage("reconstruct");
+        let names = InputNames {
+            scan: &self.scan,
+            recording: &self.recording,
+        };
+        let RefinedScan {
+            mesh,
+            summary: refinement,
+            losses,
+        } = refinement.finish(names)?;
+        refinement
+            .findings
+            .iter()
+            .for_each(|finding| warn!("{finding}"));
+        let places = OutcomePlaces {
+            mesh: &self.mesh_out,
+            unit: self.mesh_unit,
+            scan: &self.scan,
+            features: self.features_out.as_deref(),
+            touches: self.touches_out.as_deref(),
+        };
+        places.write(mesh)?;
+        drop(stage);
+        let summary = RefineSummary {
+            scene,
+            told,
+            cloud,
+            refinement,
+            load_s,
+            replay_s,
+        };
+        Ok(RefinementResult {
+            repair,
+            summary,
+            losses,
+        })
+    }
+
+    /// Stages built from the scene for these samples.
+    fn cost(&self, refinement: &Refinement) -> SceneCost {
+        let unused = [
+            LeftOut {
+                part: "robot",
+                reason: "a replay moves no arm",
+            },
+            LeftOut {
+                part: "markers",
+                reason: "the recording is read for poses",
+            },
+        ];
+        let unused = match self.recorded.markers_topic {
+            Some(_) => &unused[..1],
+            None => &unused,
+        };
+        let input = refinement.input();
+        SceneCost {
+            parts: input.scene.built(unused, &touchup_node::FEATURES),
+            memory: Memory::of(refinement.footprint(), input.bytes()),
+        }
+    }
+}
+
+impl RefineSummary {
+    /// Counts of samples, timings, and the stages built from the scene.
+    pub fn details(&self) -> String {
+        let RefinementSummary {
+            samples,
+            accepted,
+            refused,
+            cut_back,
+            push_ns,
+            outcome,
+            ..
+        } = &self.refinement;
+        let refused = by_reason(refused);
+        let Quantiles {
+            median,
+            p99,
+            p999,
+            max,
+        } = push_ns;
+        let mut lines = vec![
+            format!("samples: {samples} read, {accepted} accepted; refused: {refused}"),
+            format!(
+                "faces moved: {}; updates cut back: {cut_back}",
+                outcome.moved_faces
+            ),
+        ];
+        lines.extend(
+            outcome
+                .patch
+                .as_ref()
+                .map(|patch| format!("reconstruction: {:.2} s", patch.build_s)),
+        );
+        lines.push(format!(
+            "time of a sample: median {median} ns, p99 {p99} ns, p99.9 {p999} ns, max {max} ns"
+        ));
+        lines.push(format!(
+            "loaded in {:.2} s, replayed in {:.2} s",
+            self.load_s, self.replay_s
+        ));
+        lines.push(self.scene.to_string());
+        lines.join("\n")
+    }
+}
+
+/// Verdict, then further results.
+impl fmt::Display for RefineSummary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}\n{}", self.refinement.verdict(), self.told)?;
+        match self.refinement.to_string() {
+            further if further.is_empty() => Ok(()),
+            further => write!(f, "\n{further}"),
+        }
+    }
+}

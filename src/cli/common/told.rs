@@ -1,0 +1,186 @@
+//! Settings of tip and scan that determine a result, and their sources.
+
+use std::fmt;
+use std::path::Path;
+
+use clap::Args;
+use serde::Serialize;
+
+use crate::cli::CliError;
+use touchup_session::scene::Scene;
+#[cfg(any(feature = "ros", feature = "r2r"))]
+use touchup_session::scene::Setting;
+
+/// Flags for tip and scan, over the scene.
+#[derive(Clone, Debug, Default, Args)]
+pub(in crate::cli) struct ToldFlags {
+    /// Radius of the ball, mm; required if no scene has it
+    #[arg(long, value_name = "R", allow_negative_numbers = true)]
+    tip_radius_mm: Option<f64>,
+    /// Stiffness of stylus and holder at the ball, N/mm
+    #[arg(long, value_name = "K", allow_negative_numbers = true)]
+    stiffness_n_per_mm: Option<f64>,
+    /// Standard deviation of the scan from the true surface, mm
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    scan_noise_mm: Option<f64>,
+}
+
+impl ToldFlags {
+    /// Flags with only the radius of the ball, m.
+    pub fn of_radius(radius: f64) -> Self {
+        Self {
+            tip_radius_mm: Some(radius * 1e3),
+            ..Self::default()
+        }
+    }
+
+    /// Scene of a file, or the default one, with the flags over it, and the sources of its numbers.
+    ///
+    /// # Errors
+    /// A missing tip radius, and a scene or a flag out of its range.
+    pub fn scene(&self, path: Option<&Path>) -> Result<(Scene, ToldNumbers), CliError> {
+        let (mut scene, yaml) = match path {
+            Some(path) => Scene::read_with_text(path)?,
+            None => (Scene::default(), String::new()),
+        };
+        self.tell(&mut scene, &yaml)?;
+        let by_flag = [
+            self.tip_radius_mm,
+            self.stiffness_n_per_mm,
+            self.scan_noise_mm,
+        ];
+        let told = ToldNumbers::of(
+            &scene,
+            &yaml,
+            by_flag.map(|flag| flag.map(|_| ToldBy::Flag)),
+        );
+        Ok((scene, told))
+    }
+}
+
+impl ToldFlags {
+    /// Applies the flags.
+    fn tell(&self, scene: &mut Scene, yaml: &str) -> Result<(), CliError> {
+        scene.tell_radius(yaml, self.tip_radius_mm)?;
+        if let Some(stiffness) = self.stiffness_n_per_mm {
+            scene.tip.get_or_insert_default().ball.stiffness = Some(stiffness * 1e3);
+        }
+        if let Some(noise_mm) = self.scan_noise_mm {
+            scene.scan.get_or_insert_default().quality.noise = noise_mm / 1e3;
+        }
+        // the file was in range when read: a flag set any value out of range
+        scene.validate().map_err(CliError::usage)
+    }
+
+    /// Text of a scene, or of the default one, with the values of the flags.
+    ///
+    /// # Errors
+    /// As [`Self::scene`], and for a scene whose text form allows no edits.
+    #[cfg(any(feature = "ros", feature = "r2r"))]
+    pub fn scene_text(&self, path: Option<&Path>) -> Result<String, CliError> {
+        let yaml = match path {
+            Some(path) => Scene::read_with_text(path)?.1,
+            None => Scene::template_without_radius(),
+        };
+        let mut expected = Scene::from_yaml(&yaml)?;
+        self.tell(&mut expected, &yaml)?;
+        let told = [
+            ("tip.radius_mm", self.tip_radius_mm),
+            ("tip.stiffness_n_per_mm", self.stiffness_n_per_mm),
+            ("scan.noise_mm", self.scan_noise_mm),
+        ];
+        let settings: Vec<_> = told
+            .into_iter()
+            .filter_map(|(key, number)| Some(Setting::scalar(key, number?)))
+            .collect();
+        Ok(Scene::edited(
+            &yaml,
+            &settings,
+            "given by flags",
+            &expected,
+        )?)
+    }
+}
+
+/// Number that determines the result.
+#[derive(Clone, Debug, Serialize)]
+struct ToldNumber {
+    value: f64,
+    source: ToldBy,
+}
+
+touchup_method::names! {
+    /// Source of a number.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+    #[serde(rename_all = "snake_case")]
+    pub enum ToldBy {
+        /// A flag.
+        Flag = "flag",
+        /// A parameter of the node.
+        Parameter = "parameter",
+        /// The scene.
+        Scene = "scene",
+        /// Default of a usual cell.
+        Default = "default",
+    }
+}
+
+/// Settings of tip and scan; a rigid tip has no stiffness.
+#[derive(Clone, Debug, Serialize)]
+pub(in crate::cli) struct ToldNumbers {
+    tip_radius_mm: ToldNumber,
+    stiffness_n_per_mm: Option<ToldNumber>,
+    scan_noise_mm: ToldNumber,
+}
+
+impl ToldNumbers {
+    /// - `yaml`: text of the scene; empty for none.
+    /// - `others`: sources of radius, stiffness and noise over the scene.
+    pub fn of(scene: &Scene, yaml: &str, others: [Option<ToldBy>; 3]) -> Self {
+        let [by_radius, by_stiffness, by_noise] = others;
+        let told = |value: f64, other: Option<ToldBy>, section: &str, key: &str| {
+            let by_scene = if Scene::names(yaml, section, key) {
+                ToldBy::Scene
+            } else {
+                ToldBy::Default
+            };
+            ToldNumber {
+                value,
+                source: other.unwrap_or(by_scene),
+            }
+        };
+        let tip = scene.tip_params();
+        let noise = scene.scan.as_ref().map_or(0.0, |scan| scan.quality.noise);
+        Self {
+            tip_radius_mm: told(tip.radius * 1e3, by_radius, "tip", "radius_mm"),
+            stiffness_n_per_mm: tip
+                .stiffness
+                .map(|k| told(k / 1e3, by_stiffness, "tip", "stiffness_n_per_mm")),
+            scan_noise_mm: told(noise * 1e3, by_noise, "scan", "noise_mm"),
+        }
+    }
+}
+
+impl fmt::Display for ToldNumbers {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            tip_radius_mm: radius,
+            stiffness_n_per_mm: stiffness,
+            scan_noise_mm: noise,
+        } = self;
+        write!(
+            f,
+            "tip: radius {:.4} mm ({}), ",
+            radius.value, radius.source
+        )?;
+        match stiffness {
+            Some(stiffness) => write!(
+                f,
+                "stiffness {:.4} N/mm ({})",
+                stiffness.value, stiffness.source
+            )?,
+            None => write!(f, "rigid")?,
+        }
+        write!(f, "; scan: noise {:.3} mm ({})", noise.value, noise.source)
+    }
+}
