@@ -35,11 +35,11 @@ pub(super) struct CalibrationFit {
 }
 
 impl CalibrationFit {
-    pub fn residual(&self, equation: &Equation) -> Vector3<f64> {
+    pub(crate) fn residual(&self, equation: &Equation) -> Vector3<f64> {
         equation.z - equation.a * self.x - self.y
     }
 
-    pub fn rejected(&self) -> usize {
+    pub(crate) fn rejected(&self) -> usize {
         self.kept.iter().filter(|kept| !**kept).count()
     }
 }
@@ -67,7 +67,7 @@ pub(super) struct UndeterminedDirection {
 
 impl UndeterminedDirection {
     /// Rotation of the poses to either side across the axis, if A is a rotation, rad.
-    pub fn angle(&self) -> f64 {
+    pub(crate) fn angle(&self) -> f64 {
         self.spread.clamp(0.0, 1.0).sqrt().asin()
     }
 }

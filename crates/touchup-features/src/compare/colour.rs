@@ -42,7 +42,7 @@ pub(super) struct ColourScale {
 }
 
 impl ColourScale {
-    pub fn colour(&self, deviation: f64) -> Rgb {
+    pub(crate) fn colour(&self, deviation: f64) -> Rgb {
         let is_within = self
             .tolerance
             .is_some_and(|tolerance| deviation.abs() <= tolerance);

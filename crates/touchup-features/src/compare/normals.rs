@@ -61,7 +61,7 @@ pub fn tilts(mesh: &TriMesh, truth: &TriMesh, tree: &FaceTree) -> Result<Vec<Til
 
 impl TiltSummary {
     /// `None` without area.
-    pub fn of(tilts: &[Tilt]) -> Option<Self> {
+    pub(crate) fn of(tilts: &[Tilt]) -> Option<Self> {
         let mut angles: Vec<_> = tilts.iter().map(|tilt| (tilt.angle, tilt.area)).collect();
         let (median, p95) = (
             weighted_quantile(&mut angles, 0.5)?,

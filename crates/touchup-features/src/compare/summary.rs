@@ -64,7 +64,7 @@ pub(crate) const BINS: usize = 40;
 impl Histogram {
     /// Of deviations in m, in 40 bins from −`range` to `range` (m, more than 0); a bin includes its
     /// lower end.
-    pub fn of(deviations: &[f64], range: f64) -> Self {
+    pub(crate) fn of(deviations: &[f64], range: f64) -> Self {
         let width = 2.0 * range / BINS as f64;
         let mut histogram = Self {
             from: -range,

@@ -25,5 +25,5 @@ pub use general::GeneralTolerance;
 pub use matching::{FeatureMatch, FeaturePlace, SoughtFeature, match_features};
 pub use of_feature::measured_number;
 pub use place::place_number;
-pub use probability::{Distribution, ToleranceLimits, conformance_probability};
+pub use probability::{Distribution, ToleranceLimits};
 pub use repeated::repeated_confidence;

@@ -28,7 +28,7 @@ impl ToleranceLimits {
     }
 
     /// Whether a value is within the limits.
-    pub fn hold(&self, value: f64) -> bool {
+    pub(crate) fn hold(&self, value: f64) -> bool {
         self.lower.is_none_or(|lower| value >= lower)
             && self.upper.is_none_or(|upper| value <= upper)
     }
@@ -69,7 +69,7 @@ impl InspectedQuantity {
 /// Probability p_c that the measurand is within the limits.
 ///
 /// - `std`: standard uncertainty, 0 or more. 0: the measurand is the value.
-pub fn conformance_probability(
+pub(crate) fn conformance_probability(
     value: f64,
     std: f64,
     limits: ToleranceLimits,

@@ -27,7 +27,7 @@ pub(super) struct ForceLevels {
 
 impl ForceLevels {
     /// The rest is the densest force: presses scatter wider than free motion.
-    pub fn of(records: &[InputRecord], noise: f64) -> Self {
+    pub(crate) fn of(records: &[InputRecord], noise: f64) -> Self {
         let forces: Vec<Vector3<f64>> = records.iter().map(InputRecord::force_t).collect();
         let step = (forces.len() / REST_CANDIDATES).max(1);
         let distances = |from: &Vector3<f64>| {
@@ -58,7 +58,7 @@ impl ForceLevels {
     }
 
     /// The same with a rest of zero.
-    pub fn without_rest(self, records: &[InputRecord]) -> Self {
+    pub(crate) fn without_rest(self, records: &[InputRecord]) -> Self {
         let mut sizes: Vec<f64> = records.iter().map(|record| record.force_o.norm()).collect();
         sizes.sort_unstable_by(f64::total_cmp);
         Self {
@@ -69,20 +69,20 @@ impl ForceLevels {
     }
 
     /// |F − rest|, N.
-    pub fn off_rest(&self, record: &InputRecord) -> f64 {
+    pub(crate) fn off_rest(&self, record: &InputRecord) -> f64 {
         (record.force_t() - self.rest_t).norm()
     }
 
     /// F − rest in O, N.
-    pub fn force_o(&self, record: &InputRecord) -> Vector3<f64> {
+    pub(crate) fn force_o(&self, record: &InputRecord) -> Vector3<f64> {
         record.force_o - record.rotation * self.rest_t
     }
 
-    pub fn is_pressing(&self, record: &InputRecord) -> bool {
+    pub(crate) fn is_pressing(&self, record: &InputRecord) -> bool {
         self.off_rest(record) > (NOISES * self.noise).max(SHARE_OF_LARGEST * self.largest)
     }
 
-    pub fn is_resting(&self, record: &InputRecord) -> bool {
+    pub(crate) fn is_resting(&self, record: &InputRecord) -> bool {
         self.off_rest(record) <= (4.0 * self.noise).max(0.05 * self.largest)
     }
 }
@@ -102,7 +102,7 @@ pub(super) struct SensorWeight {
 const DAMPING: f64 = 1e-6;
 
 impl SensorWeight {
-    pub fn of(records: &[InputRecord]) -> Option<Self> {
+    pub(crate) fn of(records: &[InputRecord]) -> Option<Self> {
         let turned = |record: &InputRecord| {
             let back = record.rotation.inverse().to_rotation_matrix();
             let mut rows = SMatrix::<f64, 3, 6>::zeros();

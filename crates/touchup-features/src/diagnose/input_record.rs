@@ -11,7 +11,7 @@ pub(super) struct InputRecord {
 }
 
 impl InputRecord {
-    pub fn force_t(&self) -> Vector3<f64> {
+    pub(crate) fn force_t(&self) -> Vector3<f64> {
         self.rotation.inverse_transform_vector(&self.force_o)
     }
 }

@@ -111,7 +111,7 @@ pub(super) struct StraightPress {
 
 impl InputJudge<'_> {
     /// All doubts.
-    pub fn findings(&self) -> Vec<InputFinding> {
+    pub(crate) fn findings(&self) -> Vec<InputFinding> {
         let (presses, resting) = match self.presses() {
             Ok(found) => found,
             Err(untouched) => return untouched,

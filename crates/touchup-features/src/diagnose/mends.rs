@@ -26,7 +26,7 @@ pub(super) struct PlaceMend {
 
 impl PlaceMend {
     /// Corrected place of the ball, in the scan as read.
-    pub fn centre(&self, placement: &Placement, record: &InputRecord) -> Point3<f64> {
+    pub(crate) fn centre(&self, placement: &Placement, record: &InputRecord) -> Point3<f64> {
         let pose = self.pose(placement, record);
         (pose.translation.vector + pose.rotation * self.tip)
             .scale(self.scan_unit)
@@ -34,12 +34,16 @@ impl PlaceMend {
     }
 
     /// A force in O, if it shares the axes of the positions.
-    pub fn turned(&self, force: &Vector3<f64>) -> Vector3<f64> {
+    pub(crate) fn turned(&self, force: &Vector3<f64>) -> Vector3<f64> {
         self.poses * force
     }
 
     /// Corrected rotation of the ball.
-    pub fn rotation(&self, placement: &Placement, record: &InputRecord) -> UnitQuaternion<f64> {
+    pub(crate) fn rotation(
+        &self,
+        placement: &Placement,
+        record: &InputRecord,
+    ) -> UnitQuaternion<f64> {
         self.pose(placement, record).rotation
     }
 
@@ -58,7 +62,7 @@ impl PlaceMend {
     }
 
     /// w first in the quaternion.
-    pub fn w_first() -> Self {
+    pub(crate) fn w_first() -> Self {
         Self {
             cause: InputCause::QuaternionOrder,
             says: "the poses fit with w first in the quaternion".to_owned(),
@@ -81,7 +85,7 @@ impl PlaceMend {
     /// A ball farther along the stylus than the recorded point.
     ///
     /// - `tip`: from that point, in the axes of T, m.
-    pub fn tip(tip: Vector3<f64>) -> Self {
+    pub(crate) fn tip(tip: Vector3<f64>) -> Self {
         let [x, y, z] = [tip.x, tip.y, tip.z].map(|x| x * 1e3);
         Self {
             cause: InputCause::Frame,
@@ -94,7 +98,7 @@ impl PlaceMend {
     }
 
     /// Usual length factors by which a file or driver is wrong.
-    pub fn units() -> impl Iterator<Item = Self> {
+    pub(crate) fn units() -> impl Iterator<Item = Self> {
         const UNITS: [(f64, f64, &str); 10] = [
             (1e-3, 1.0, "the poses look like mm, and are read as m"),
             (1e3, 1.0, "the poses look like km, and are read as m"),
@@ -128,7 +132,7 @@ impl PlaceMend {
     }
 
     /// Swapped and mirrored position axes.
-    pub fn axes() -> impl Iterator<Item = Self> {
+    pub(crate) fn axes() -> impl Iterator<Item = Self> {
         signed_permutations().skip(1).map(|poses| Self {
             says: format!(
                 "the positions fit with their axes taken as {}",

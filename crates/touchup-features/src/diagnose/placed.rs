@@ -57,7 +57,11 @@ impl InputJudge<'_> {
     /// The fault in the places of the presses, and whether they still lie on the scan.
     ///
     /// - `is_few`: too few touched places: almost any motion and ball explains them.
-    pub fn judge_places(&self, presses: &Presses, is_few: bool) -> Option<(InputFinding, bool)> {
+    pub(crate) fn judge_places(
+        &self,
+        presses: &Presses,
+        is_few: bool,
+    ) -> Option<(InputFinding, bool)> {
         let Presses { records, .. } = presses;
         let radius = self.params.tip.radius;
         let tolerance = presses.tolerance + presses.sunk;

@@ -32,7 +32,7 @@ pub(super) struct ScanScale {
 impl ScanScale {
     /// Noise: distance of a vertex from the mean of its neighbours along its normal; for n
     /// independent neighbours that is σ √(1 + 1/n).
-    pub fn of(scan: &TriMesh) -> Self {
+    pub(crate) fn of(scan: &TriMesh) -> Self {
         let step = (scan.vertex_slots() / NOISE_VERTICES).max(1);
         let (mut off, mut edges) = (Vec::new(), Vec::new());
         for vertex in (0..scan.vertex_slots())
@@ -72,7 +72,7 @@ impl ScanScale {
     /// Tolerance of the distance between ball centre and surface about one radius, m.
     ///
     /// - `unit`: length of a true 1 m in the scan as read, m.
-    pub fn tolerance(&self, told_noise: f64, radius: f64, unit: f64) -> f64 {
+    pub(crate) fn tolerance(&self, told_noise: f64, radius: f64, unit: f64) -> f64 {
         let noise = self.noise.max(told_noise);
         (3.0 * noise + 0.2 * self.edge + 0.1 * radius)
             .clamp(LEAST_TOLERANCE * unit, LARGEST_TOLERANCE * unit)
@@ -127,14 +127,14 @@ pub(super) struct ScanAgreement {
 
 impl ScanAgreement {
     /// Share on the scan; presses in holes that it lacks do not count, unless they are most of all.
-    pub fn on_scan(&self) -> f64 {
+    pub(crate) fn on_scan(&self) -> f64 {
         let is_lid = self.in_holes as f64 <= MOST_UNDER_LIDS * self.count as f64;
         let count = self.count - if is_lid { self.in_holes } else { 0 };
         self.on_scan as f64 / count.max(1) as f64
     }
 
     /// Share on the scan, or in holes that it lacks.
-    pub fn on_scan_or_in_holes(&self) -> f64 {
+    pub(crate) fn on_scan_or_in_holes(&self) -> f64 {
         (self.on_scan + self.in_holes) as f64 / self.count.max(1) as f64
     }
 }
@@ -154,7 +154,7 @@ pub(super) fn error_of_median(scatter: f64, count: usize) -> f64 {
 }
 
 impl BallFit {
-    pub fn of(
+    pub(crate) fn of(
         scan: &TriMesh,
         tree: &FaceTree,
         centres: impl Iterator<Item = Point3<f64>>,
@@ -210,7 +210,12 @@ impl BallFit {
     /// points out of it.
     ///
     /// - `forces`: of each centre, in O.
-    pub fn explained(&self, forces: &[Vector3<f64>], radius: f64, tolerance: f64) -> ScanAgreement {
+    pub(crate) fn explained(
+        &self,
+        forces: &[Vector3<f64>],
+        radius: f64,
+        tolerance: f64,
+    ) -> ScanAgreement {
         let mut of = ScanAgreement {
             on_scan: 0,
             in_holes: 0,
@@ -227,7 +232,7 @@ impl BallFit {
 
     /// Share of the centres farther off the surface than `distance`, m, on either side: beside the
     /// part and over holes of the scan the side is unknown.
-    pub fn share_beyond(&self, distance: f64) -> f64 {
+    pub(crate) fn share_beyond(&self, distance: f64) -> f64 {
         self.distances.iter().filter(|x| x.abs() > distance).count() as f64
             / self.distances.len().max(1) as f64
     }

@@ -61,7 +61,7 @@ fn deviation(left: impl Iterator<Item = f64>) -> f64 {
 
 impl InputJudge<'_> {
     /// A scan turned or shifted from its stated pose.
-    pub fn judge_registration(&self, presses: &Presses) -> Option<InputFinding> {
+    pub(crate) fn judge_registration(&self, presses: &Presses) -> Option<InputFinding> {
         let straight = self.straight_presses(presses);
         let radius = self.params.tip.radius;
         let middle = mean(straight.iter().map(|press| press.centre.coords));

@@ -60,12 +60,12 @@ pub(super) struct InputStamps {
 impl InputStamps {
     /// Takes a sample with one stamp for pose and wrench.
     #[inline]
-    pub fn push_pair(&mut self, stamp_ns: i64) {
+    pub(crate) fn push_pair(&mut self, stamp_ns: i64) {
         self.poses.push(stamp_ns);
         self.wrenches.push(stamp_ns);
     }
 
-    pub fn push(&mut self, message: &Message) {
+    pub(crate) fn push(&mut self, message: &Message) {
         let stream = if matches!(message, Message::Pose(_)) {
             &mut self.poses
         } else {
@@ -75,13 +75,13 @@ impl InputStamps {
     }
 
     /// Median time between two poses, s.
-    pub fn pose_period(&self) -> f64 {
+    pub(crate) fn pose_period(&self) -> f64 {
         median(&mut self.poses.periods.clone()).unwrap_or(0.0)
     }
 
     /// - `largest_gap_ns`: maximum gap between two poses for interpolation.
     /// - `samples`: number of samples from the messages.
-    pub fn findings(&self, largest_gap_ns: i64, samples: u64) -> Vec<InputFinding> {
+    pub(crate) fn findings(&self, largest_gap_ns: i64, samples: u64) -> Vec<InputFinding> {
         let mut findings = Vec::new();
         for (name, stream) in [("poses", &self.poses), ("wrenches", &self.wrenches)] {
             if stream.count >= FEWEST && 2 * stream.zeros > stream.count {
@@ -145,7 +145,7 @@ impl InputStamps {
         findings
     }
 
-    pub fn counts(&self) -> [u64; 2] {
+    pub(crate) fn counts(&self) -> [u64; 2] {
         [self.poses.count, self.wrenches.count]
     }
 }

@@ -282,7 +282,7 @@ pub(super) fn course_at(
 
 impl ReadPress {
     /// - `axes`: rotation from O to the axes of the wrench as read.
-    pub fn new(
+    pub(crate) fn new(
         place: VoxelKey,
         axes: &UnitQuaternion<f64>,
         [normal, course]: [Vector3<f64>; 2],

@@ -36,7 +36,7 @@ pub(super) struct Surroundings<'a> {
 }
 
 impl Bodies {
-    pub fn of(facets: &Facets) -> Self {
+    pub(crate) fn of(facets: &Facets) -> Self {
         let (piece_of, pieces) = pieces(facets);
         if pieces.len() < 2 {
             return Self::default();
@@ -59,12 +59,12 @@ impl Bodies {
     }
 
     /// Number of the piece of a face.
-    pub fn piece_of(&self, face: u32) -> u32 {
+    pub(crate) fn piece_of(&self, face: u32) -> u32 {
         self.piece_of.get(face as usize).copied().unwrap_or(0)
     }
 
     /// Surroundings of a face.
-    pub fn around<'a>(
+    pub(crate) fn around<'a>(
         &'a self,
         face: Option<u32>,
         mesh: &'a TriMesh,
@@ -87,13 +87,13 @@ impl Bodies {
 
 impl<'a> Surroundings<'a> {
     /// The face closest to `p` within `reach`, m.
-    pub fn closest(&self, p: &Point3<f64>, reach: f64) -> Option<u32> {
+    pub(crate) fn closest(&self, p: &Point3<f64>, reach: f64) -> Option<u32> {
         let face = self.tree.closest(self.mesh, p, reach)?.face.0;
         Some(self.faces.map_or(face, |faces| faces[face as usize]))
     }
 
     /// - `piece`: as in [`Rays::new`], m.
-    pub fn rays(&self, piece: f64) -> Rays<'a> {
+    pub(crate) fn rays(&self, piece: f64) -> Rays<'a> {
         Rays::new(self.mesh, self.tree, piece, self.faces)
     }
 }

@@ -35,7 +35,7 @@ pub(super) struct Creases {
 
 impl Creases {
     /// - `sharp_angle`, `sharp_defect`: as in [`super::clusters::ClusterParams`], rad.
-    pub fn find(
+    pub(crate) fn find(
         mesh: &TriMesh,
         curvature: &[VertexCurvature],
         sharp_angle: f64,
@@ -86,7 +86,7 @@ impl Creases {
     }
 
     /// Creases of one kind that share a vertex, as sets.
-    pub fn connected(&self) -> DisjointSets {
+    pub(crate) fn connected(&self) -> DisjointSets {
         let mut regions = DisjointSets::of(self.list.len());
         let ends =
             |(i, crease): (usize, &Crease)| crease.ends.map(|v| ((crease.bend, v), i as u32));
@@ -97,7 +97,7 @@ impl Creases {
 
     /// Joins creases of one kind with points in one cell of a grid of size `near`, or in adjacent
     /// cells: all that are closer than `near`, none that are farther than 2√3 times that.
-    pub fn merge(&self, regions: &mut DisjointSets, mesh: &TriMesh, near: f64) {
+    pub(crate) fn merge(&self, regions: &mut DisjointSets, mesh: &TriMesh, near: f64) {
         let lengths = |crease: &Crease| {
             (mesh.position(crease.ends[1]) - mesh.position(crease.ends[0])).norm()
         };

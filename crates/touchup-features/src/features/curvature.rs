@@ -91,7 +91,7 @@ const COUNTED: u32 = 64;
 impl Fan {
     /// Curvature at one vertex: an edit changes the vertices of the moved faces.
     #[inline]
-    pub fn curvature(&mut self, mesh: &TriMesh, vertex: VertexId) -> VertexCurvature {
+    pub(crate) fn curvature(&mut self, mesh: &TriMesh, vertex: VertexId) -> VertexCurvature {
         self.gather(mesh, vertex);
         let kind = self.kind();
         if kind == VertexKind::Unused {

@@ -52,7 +52,7 @@ impl Measure<'_> {
     /// drawing the roundness of its corners.
     ///
     /// - `segments`: of the wall.
-    pub fn round_form(
+    pub(crate) fn round_form(
         &self,
         fitted: &FittedSurface<Cylinder>,
         segments: &[usize],
@@ -70,7 +70,7 @@ impl Measure<'_> {
 
     /// Distance of a drawing's facets inside the surface through their corners, m; `None` if on it,
     /// and for a measured mesh.
-    pub fn facets(&self, surface: &impl SurfaceModel, segments: &[usize]) -> Option<f64> {
+    pub(crate) fn facets(&self, surface: &impl SurfaceModel, segments: &[usize]) -> Option<f64> {
         let parted = self.observed.parted;
         let rounding = parted.rounding?;
         let faces = segments
@@ -87,14 +87,14 @@ impl Measure<'_> {
     }
 
     /// Flatness of a plane fitted to touches.
-    pub fn flat_form(&self, fitted: &FittedSurface<Plane>) -> Option<FlatForm> {
+    pub(crate) fn flat_form(&self, fitted: &FittedSurface<Plane>) -> Option<FlatForm> {
         let points = self.form_points(fitted);
         flat_form(&points, &fitted.surface.point(), &fitted.surface.normal())
             .filter(|_| fitted.to == FittedTo::Touches)
     }
 
     /// The axis of a wall fitted to touches, over the heights of these.
-    pub fn axis_element(&self, fitted: &FittedSurface<Cylinder>) -> Option<Element> {
+    pub(crate) fn axis_element(&self, fitted: &FittedSurface<Cylinder>) -> Option<Element> {
         let direction = fitted.surface.axis();
         let places = self.touched_places(fitted)?;
         let heights = || {
@@ -113,7 +113,7 @@ impl Measure<'_> {
     }
 
     /// A plane fitted to touches, within the extent of these.
-    pub fn plane_element(&self, fitted: &FittedSurface<Plane>) -> Option<Element> {
+    pub(crate) fn plane_element(&self, fitted: &FittedSurface<Plane>) -> Option<Element> {
         let normal = fitted.surface.normal();
         let [u, v] = tangent_basis(&normal);
         let places = self.touched_places(fitted)?;

@@ -22,7 +22,7 @@ pub(super) struct Facets<'a> {
 }
 
 impl<'a> Facets<'a> {
-    pub fn of(mesh: &'a TriMesh) -> Self {
+    pub(crate) fn of(mesh: &'a TriMesh) -> Self {
         let slots = mesh.face_slots();
         let (mut normals, mut areas) = (Vec::with_capacity(slots), Vec::with_capacity(slots));
         for face in (0..slots as u32).map(FaceId) {
@@ -57,27 +57,27 @@ impl<'a> Facets<'a> {
     }
 
     /// Number of faces, with removed ones.
-    pub fn slots(&self) -> usize {
+    pub(crate) fn slots(&self) -> usize {
         self.areas.len()
     }
 
     #[inline]
-    pub fn normal(&self, face: u32) -> Vector3<f64> {
+    pub(crate) fn normal(&self, face: u32) -> Vector3<f64> {
         self.normals[face as usize]
     }
 
     #[inline]
-    pub fn area(&self, face: u32) -> f64 {
+    pub(crate) fn area(&self, face: u32) -> f64 {
         self.areas[face as usize]
     }
 
     /// m²
-    pub fn area_of(&self, faces: &[u32]) -> f64 {
+    pub(crate) fn area_of(&self, faces: &[u32]) -> f64 {
         faces.iter().map(|&face| self.area(face)).sum()
     }
 
     /// The faces beside, each with the number of its edge.
-    pub fn beside(&self, face: u32) -> impl Iterator<Item = (usize, u32)> + use<> {
+    pub(crate) fn beside(&self, face: u32) -> impl Iterator<Item = (usize, u32)> + use<> {
         self.beside[face as usize]
             .into_iter()
             .enumerate()
@@ -85,7 +85,7 @@ impl<'a> Facets<'a> {
     }
 
     /// Numbers of the edges of a face without any other face.
-    pub fn open_edges(&self, face: u32) -> impl Iterator<Item = usize> + '_ {
+    pub(crate) fn open_edges(&self, face: u32) -> impl Iterator<Item = usize> + '_ {
         let corners = self.mesh.corners(FaceId(face));
         let beside = self.beside[face as usize];
         let is_open = move |&edge: &usize| {
@@ -95,12 +95,12 @@ impl<'a> Facets<'a> {
         (0..3).filter(is_open)
     }
 
-    pub fn triangle(&self, face: u32) -> [Point3<f64>; 3] {
+    pub(crate) fn triangle(&self, face: u32) -> [Point3<f64>; 3] {
         self.mesh.triangle(FaceId(face))
     }
 
     /// Ends of an edge, m.
-    pub fn edge(&self, face: u32, edge: usize) -> [Point3<f64>; 2] {
+    pub(crate) fn edge(&self, face: u32, edge: usize) -> [Point3<f64>; 2] {
         let corners = self.triangle(face);
         [corners[edge], corners[(edge + 1) % 3]]
     }

@@ -29,7 +29,7 @@ pub(super) struct FlatPiece {
 
 impl Flats {
     /// `None` for a mesh that is no drawing.
-    pub fn of(facets: &Facets) -> Option<Self> {
+    pub(crate) fn of(facets: &Facets) -> Option<Self> {
         is_drawn(facets).then(|| Self {
             of_face: vec![NONE; facets.slots()],
             flats: Vec::new(),
@@ -37,7 +37,7 @@ impl Flats {
     }
 
     /// The flat piece of a face.
-    pub fn at(&mut self, facets: &Facets, face: u32) -> &FlatPiece {
+    pub(crate) fn at(&mut self, facets: &Facets, face: u32) -> &FlatPiece {
         let known = self.of_face[face as usize];
         let number = if known == NONE {
             self.add(facets, face)
@@ -69,7 +69,7 @@ impl Flats {
 
 impl FlatPiece {
     /// The neighbouring faces that continue it without an edge.
-    pub fn beside<'a>(&'a self, facets: &'a Facets) -> impl Iterator<Item = u32> + 'a {
+    pub(crate) fn beside<'a>(&'a self, facets: &'a Facets) -> impl Iterator<Item = u32> + 'a {
         let normal = facets.normal(self.faces[0]);
         let beside = self
             .faces

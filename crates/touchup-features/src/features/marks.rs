@@ -4,17 +4,17 @@
 pub(super) struct NumberSet(Vec<u64>);
 
 impl NumberSet {
-    pub fn below(limit: usize) -> Self {
+    pub(crate) fn below(limit: usize) -> Self {
         Self(vec![0; limit.div_ceil(64)])
     }
 
     #[inline]
-    pub fn add(&mut self, number: u32) {
+    pub(crate) fn add(&mut self, number: u32) {
         self.0[number as usize / 64] |= 1 << (number % 64);
     }
 
     /// In ascending order.
-    pub fn iter(&self) -> impl Iterator<Item = u32> + '_ {
+    pub(crate) fn iter(&self) -> impl Iterator<Item = u32> + '_ {
         let of_word = |(at, &word): (usize, &u64)| {
             let rest = |&word: &u64| Some(word & word.wrapping_sub(1));
             let words = std::iter::successors(Some(word), rest).take_while(|&word| word != 0);

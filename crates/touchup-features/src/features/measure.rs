@@ -77,7 +77,7 @@ fn is_over_end(touch: &ProbedPoint, wall: &Wall) -> bool {
 }
 
 impl<'a> Measure<'a> {
-    pub fn new(observed: &'a SegmentTouches<'a>) -> Self {
+    pub(crate) fn new(observed: &'a SegmentTouches<'a>) -> Self {
         Self {
             observed,
             planes: RefCell::new(BTreeMap::new()),
@@ -85,7 +85,7 @@ impl<'a> Measure<'a> {
     }
 
     /// The plane of a segment.
-    pub fn plane(&self, number: usize) -> Option<FittedSurface<Plane>> {
+    pub(crate) fn plane(&self, number: usize) -> Option<FittedSurface<Plane>> {
         if let Some(known) = self.planes.borrow().get(&number) {
             return Some(known.clone());
         }
@@ -100,7 +100,7 @@ impl<'a> Measure<'a> {
 
     /// The plane of a segment beside an edge: a strip of touches along the edge places the plane,
     /// if wide in comparison with the mesh of the plane. `None` for other segments.
-    pub fn plane_beside_edge(&self, number: usize) -> Option<FittedSurface<Plane>> {
+    pub(crate) fn plane_beside_edge(&self, number: usize) -> Option<FittedSurface<Plane>> {
         let plane = self.plane(number)?;
         if plane.to == FittedTo::Touches {
             return Some(plane);
@@ -159,7 +159,7 @@ impl<'a> Measure<'a> {
     }
 
     /// The plane through touches, about square to `normal`; `None` without touches.
-    pub fn felt_plane(
+    pub(crate) fn felt_plane(
         &self,
         touches: &[u32],
         point: &Point3<f64>,
@@ -178,7 +178,7 @@ impl<'a> Measure<'a> {
     }
 
     /// The cylinder of a segment; `None` for other segments.
-    pub fn shaft(&self, number: usize) -> Option<FittedSurface<Cylinder>> {
+    pub(crate) fn shaft(&self, number: usize) -> Option<FittedSurface<Cylinder>> {
         let Primitive::Cylinder(guess) = self.observed.parted.segment(number).primitive else {
             return None;
         };
@@ -200,7 +200,7 @@ impl<'a> Measure<'a> {
     /// The cylinder of a wall.
     ///
     /// - `rim`: number of the plane around its opening.
-    pub fn cylinder(&self, wall: &Wall, rim: Option<usize>) -> FittedSurface<Cylinder> {
+    pub(crate) fn cylinder(&self, wall: &Wall, rim: Option<usize>) -> FittedSurface<Cylinder> {
         let touches = self.touches_around(wall);
         let (mut axis, mut axis_sigma) = (wall.axis, None);
         let height = if touches.is_empty() {
@@ -229,7 +229,7 @@ impl<'a> Measure<'a> {
     }
 
     /// The cone of a wall; `None` for a cylinder.
-    pub fn cone(&self, wall: &Wall) -> Option<FittedSurface<Cone>> {
+    pub(crate) fn cone(&self, wall: &Wall) -> Option<FittedSurface<Cone>> {
         let guess = Cone::new(
             wall.at(wall.middle()),
             &wall.axis,
@@ -317,7 +317,7 @@ impl<'a> Measure<'a> {
     }
 
     /// The walls of a slot or pocket.
-    pub fn stadium(&self, slot: &Slot) -> FittedSurface<Stadium> {
+    pub(crate) fn stadium(&self, slot: &Slot) -> FittedSurface<Stadium> {
         let ends = slot.shape;
         let land = self
             .plane(slot.land)
@@ -449,7 +449,7 @@ impl<'a> Measure<'a> {
     }
 
     /// Share of a turn around a wall that touches cover.
-    pub fn turn(&self, touches: &[u32], wall: &Wall) -> f64 {
+    pub(crate) fn turn(&self, touches: &[u32], wall: &Wall) -> f64 {
         let [e, g] = tangent_basis(&wall.axis);
         let mut parts = [false; PARTS];
         for &number in touches {
@@ -473,7 +473,7 @@ impl<'a> Measure<'a> {
 
 impl FittedSurface<Plane> {
     /// Intersection of a line with the plane, m; its uncertainty is along the normal.
-    pub fn met(
+    pub(crate) fn met(
         &self,
         from: &Point3<f64>,
         direction: &Vector3<f64>,
@@ -484,7 +484,7 @@ impl FittedSurface<Plane> {
 
 impl FittedSurface<Cylinder> {
     /// Exit of a line from the cylinder, m; its uncertainty is along the normal there.
-    pub fn met(
+    pub(crate) fn met(
         &self,
         from: &Point3<f64>,
         direction: &Vector3<f64>,
@@ -502,7 +502,7 @@ impl<S: SurfaceModel> FittedSurface<S> {
 
     /// Standard deviation at a place without the common error of all touches, m: two surfaces of a
     /// mesh have no common error.
-    pub fn own_std_at(&self, place: &Point3<f64>) -> Option<f64> {
+    pub(crate) fn own_std_at(&self, place: &Point3<f64>) -> Option<f64> {
         self.confirmed().and_then(|fit| match self.to {
             FittedTo::Touches => fit.own_std_at(place),
             FittedTo::Mesh => fit.std_at(place),
@@ -510,12 +510,12 @@ impl<S: SurfaceModel> FittedSurface<S> {
     }
 
     /// The fit, if its standard deviations hold for the surface.
-    pub fn confirmed(&self) -> Option<&Fit<S>> {
+    pub(crate) fn confirmed(&self) -> Option<&Fit<S>> {
         self.fit.as_ref().filter(|_| self.is_confirmed)
     }
 
     /// The direction of the surface, oriented along `direction`.
-    pub fn axis(&self, direction: &Vector3<f64>) -> MeasuredValue<Vector3<f64>> {
+    pub(crate) fn axis(&self, direction: &Vector3<f64>) -> MeasuredValue<Vector3<f64>> {
         let value = self.surface.axis_towards(direction);
         MeasuredValue::new(
             value,
@@ -525,7 +525,7 @@ impl<S: SurfaceModel> FittedSurface<S> {
     }
 
     /// A number with its uncertainty, if the fit is confirmed.
-    pub fn number(&self, value: f64, by: &[(Freedom, f64)]) -> MeasuredValue<f64> {
+    pub(crate) fn number(&self, value: f64, by: &[(Freedom, f64)]) -> MeasuredValue<f64> {
         MeasuredValue::new(
             value,
             self.confirmed().and_then(|fit| fit.std_by(by)),

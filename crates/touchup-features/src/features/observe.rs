@@ -61,7 +61,11 @@ const SHARED_EDGES: f64 = 3.0;
 
 impl<'a> SegmentTouches<'a> {
     /// - `of_face`: the segment of each face, seams included.
-    pub fn of(parted: &'a SegmentedMesh<'a>, of_face: &[u32], touches: &'a [ProbedPoint]) -> Self {
+    pub(crate) fn of(
+        parted: &'a SegmentedMesh<'a>,
+        of_face: &[u32],
+        touches: &'a [ProbedPoint],
+    ) -> Self {
         let reach = touches.iter().map(|touch| touch.radius).fold(0.0, f64::max);
         let reach = if reach > 0.0 { reach } else { REACH };
         let mut observed = Self {
@@ -102,7 +106,7 @@ impl<'a> SegmentTouches<'a> {
     }
 
     /// Numbers of the touches of some segments, in ascending order.
-    pub fn touches_of(&self, segments: &[usize]) -> Vec<u32> {
+    pub(crate) fn touches_of(&self, segments: &[usize]) -> Vec<u32> {
         let mut touches: Vec<u32> = segments
             .iter()
             .flat_map(|&number| &self.of_segment[number])
@@ -115,7 +119,7 @@ impl<'a> SegmentTouches<'a> {
     /// Numbers of the touches on a surface, in ascending order.
     ///
     /// - `is_of`: whether a point of the surface is in the relevant part.
-    pub fn touches_on(
+    pub(crate) fn touches_on(
         &self,
         surface: &impl SurfaceModel,
         is_of: impl Fn(&Point3<f64>) -> bool,
@@ -132,7 +136,7 @@ impl<'a> SegmentTouches<'a> {
     }
 
     /// Observations of touches for a fit.
-    pub fn of_touches(&self, numbers: &[u32]) -> Vec<Observation> {
+    pub(crate) fn of_touches(&self, numbers: &[u32]) -> Vec<Observation> {
         let observation = |&number: &u32| {
             observation(&self.touches[number as usize], self.group[number as usize])
         };
@@ -141,33 +145,33 @@ impl<'a> SegmentTouches<'a> {
 
     /// Standard deviations that do not average out, m: common error of all touches along their
     /// normals, and their common displacement.
-    pub fn systematic(&self, numbers: &[u32]) -> [f64; 2] {
+    pub(crate) fn systematic(&self, numbers: &[u32]) -> [f64; 2] {
         systematic(numbers.iter().map(|&number| &self.touches[number as usize]))
     }
 
     /// Whether the part has any touch.
-    pub fn has_touches(&self) -> bool {
+    pub(crate) fn has_touches(&self) -> bool {
         !self.touches.is_empty()
     }
 
     /// The touches except outliers, with their numbers.
-    pub fn sound(&self) -> impl Iterator<Item = (u32, &ProbedPoint)> {
+    pub(crate) fn sound(&self) -> impl Iterator<Item = (u32, &ProbedPoint)> {
         (0..)
             .zip(self.touches)
             .filter(|(_, touch)| !touch.is_rejected)
     }
 
     /// Maximum distance from a touch to a touched place, m: the radius of the ball.
-    pub fn reach(&self) -> f64 {
+    pub(crate) fn reach(&self) -> f64 {
         self.reach
     }
 
-    pub fn touch(&self, number: u32) -> &ProbedPoint {
+    pub(crate) fn touch(&self, number: u32) -> &ProbedPoint {
         &self.touches[number as usize]
     }
 
     /// Observations of the mesh for a fit.
-    pub fn of_mesh(&self, segments: &[usize]) -> Vec<Observation> {
+    pub(crate) fn of_mesh(&self, segments: &[usize]) -> Vec<Observation> {
         let mesh = self.parted.facets.mesh;
         let vertices = self.vertices_of(segments);
         let step = vertices.len().div_ceil(MOST_VERTICES).max(1);
@@ -197,7 +201,7 @@ impl<'a> SegmentTouches<'a> {
 
     /// Distance of a measured mesh's faces from a surface of a radius, m; 0 in a drawing, with
     /// corners on it.
-    pub fn sagitta(&self, radius: f64) -> f64 {
+    pub(crate) fn sagitta(&self, radius: f64) -> f64 {
         match self.parted.rounding {
             Some(_) => 0.0,
             None => self.parted.edge.powi(2) / (8.0 * radius),
@@ -206,7 +210,7 @@ impl<'a> SegmentTouches<'a> {
 
     /// Observations of a segment for a fit: its vertices, or points all over it if it is flat in a
     /// drawing, as its few corners may all lie at its ends.
-    pub fn of_mesh_surface(&self, number: usize) -> Vec<Observation> {
+    pub(crate) fn of_mesh_surface(&self, number: usize) -> Vec<Observation> {
         match self
             .parted
             .rounding
@@ -260,7 +264,7 @@ impl<'a> SegmentTouches<'a> {
     }
 
     /// Touched share of the area of some segments.
-    pub fn touched_share(&self, segments: &[usize]) -> f64 {
+    pub(crate) fn touched_share(&self, segments: &[usize]) -> f64 {
         if self.touches.is_empty() {
             return 0.0;
         }
@@ -283,14 +287,14 @@ impl<'a> SegmentTouches<'a> {
     }
 
     /// Touched share of a line between two places.
-    pub fn touched_along(&self, [from, to]: &[Point3<f64>; 2]) -> f64 {
+    pub(crate) fn touched_along(&self, [from, to]: &[Point3<f64>; 2]) -> f64 {
         let count = (((to - from).norm() / self.reach).ceil() as usize).clamp(1, MOST_FACES);
         let at = |i: usize| from + (to - from) * ((i as f64 + 0.5) / count as f64);
         (0..count).filter(|&i| self.is_touched(&at(i))).count() as f64 / count as f64
     }
 
     /// Touched share of some places.
-    pub fn touched_at(&self, places: &[Point3<f64>]) -> f64 {
+    pub(crate) fn touched_at(&self, places: &[Point3<f64>]) -> f64 {
         places.iter().filter(|p| self.is_touched(p)).count() as f64 / places.len().max(1) as f64
     }
 

@@ -22,7 +22,7 @@ pub(crate) enum Primitive {
 impl Primitive {
     /// Signed distance of `p`, m: positive in the air; and the outward unit normal at its foot.
     #[inline]
-    pub fn distance_and_normal(&self, p: &Point3<f64>) -> (f64, Vector3<f64>) {
+    pub(crate) fn distance_and_normal(&self, p: &Point3<f64>) -> (f64, Vector3<f64>) {
         match self {
             Self::Plane(plane) => plane.distance_and_normal(p),
             Self::Cylinder(cylinder) => cylinder.distance_and_normal(p),
@@ -32,7 +32,7 @@ impl Primitive {
 
     /// Signed distance of `p`, m: positive in the air.
     #[inline]
-    pub fn distance(&self, p: &Point3<f64>) -> f64 {
+    pub(crate) fn distance(&self, p: &Point3<f64>) -> f64 {
         match self {
             Self::Plane(plane) => plane.distance(p),
             Self::Cylinder(cylinder) => cylinder.distance(p),
@@ -42,7 +42,7 @@ impl Primitive {
 
     /// The plane, if flat.
     #[inline]
-    pub fn plane(&self) -> Option<&Plane> {
+    pub(crate) fn plane(&self) -> Option<&Plane> {
         if let Self::Plane(plane) = self {
             Some(plane)
         } else {
@@ -169,7 +169,7 @@ pub(super) struct NormalSpread {
 }
 
 impl NormalSpread {
-    pub fn of(facets: &Facets, faces: &[u32]) -> Option<Self> {
+    pub(crate) fn of(facets: &Facets, faces: &[u32]) -> Option<Self> {
         let (mut area, mut first, mut second) = (0.0, Vector3::zeros(), Matrix3::zeros());
         for &face in faces {
             let (a, n) = (facets.area(face), facets.normal(face));
@@ -193,7 +193,7 @@ impl NormalSpread {
     }
 
     /// Axis of a cylinder with these normals: the direction of their least second moment.
-    pub fn cylinder_axis(&self) -> Option<Vector3<f64>> {
+    pub(crate) fn cylinder_axis(&self) -> Option<Vector3<f64>> {
         let eigen = self.second.symmetric_eigen();
         let mut pairs = [0, 1, 2].map(|i| {
             (

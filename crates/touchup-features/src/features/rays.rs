@@ -31,7 +31,7 @@ pub(super) struct RayHit {
 }
 
 impl<'a> Rays<'a> {
-    pub fn new(
+    pub(crate) fn new(
         mesh: &'a TriMesh,
         tree: &'a FaceTree,
         piece: f64,
@@ -48,7 +48,7 @@ impl<'a> Rays<'a> {
 
     /// The first face between `from` and the point `reach` (m) away along the unit vector
     /// `direction`.
-    pub fn first(
+    pub(crate) fn first(
         &mut self,
         from: &Point3<f64>,
         direction: &Vector3<f64>,
@@ -84,7 +84,7 @@ impl<'a> Rays<'a> {
     }
 
     /// Free length of a line, at most `reach`, m.
-    pub fn free(&mut self, from: &Point3<f64>, direction: &Vector3<f64>, reach: f64) -> f64 {
+    pub(crate) fn free(&mut self, from: &Point3<f64>, direction: &Vector3<f64>, reach: f64) -> f64 {
         self.first(from, direction, reach)
             .map_or(reach, |crossing| crossing.distance)
     }

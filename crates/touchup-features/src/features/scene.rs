@@ -88,7 +88,7 @@ pub(super) fn numbered_by_place(mesh: &TriMesh) -> TriMesh {
 }
 
 impl<'a> SegmentedMesh<'a> {
-    pub fn of(mesh: &'a TriMesh, tree: &'a FaceTree) -> Self {
+    pub(crate) fn of(mesh: &'a TriMesh, tree: &'a FaceTree) -> Self {
         let facets = Facets::of(mesh);
         let scale = MeshScale::of(&facets);
         let mut segmentation = Segmentation::of(&facets, scale);
@@ -111,27 +111,27 @@ impl<'a> SegmentedMesh<'a> {
         }
     }
 
-    pub fn segment(&self, number: usize) -> &Segment {
+    pub(crate) fn segment(&self, number: usize) -> &Segment {
         &self.segmentation.segments[number]
     }
 
     /// Whether a segment is large enough to name beside others.
-    pub fn is_strong(&self, number: usize) -> bool {
+    pub(crate) fn is_strong(&self, number: usize) -> bool {
         self.segment(number).area > LEAST_AREA * self.diagonal * self.diagonal
     }
 
     /// Whether a surface of this area, m², is large enough to report.
-    pub fn is_large(&self, area: f64) -> bool {
+    pub(crate) fn is_large(&self, area: f64) -> bool {
         area > LARGE_AREA * self.diagonal * self.diagonal
     }
 
     /// The plane of a segment, if flat.
-    pub fn plane(&self, number: usize) -> Option<&Plane> {
+    pub(crate) fn plane(&self, number: usize) -> Option<&Plane> {
         self.segment(number).primitive.plane()
     }
 
     /// Numbers of the flat segments, each with a point and the normal.
-    pub fn planes(&self) -> impl Iterator<Item = (usize, Point3<f64>, Vector3<f64>)> + '_ {
+    pub(crate) fn planes(&self) -> impl Iterator<Item = (usize, Point3<f64>, Vector3<f64>)> + '_ {
         let plane = |number| {
             self.plane(number)
                 .map(|plane| (number, plane.point(), plane.normal()))
@@ -140,7 +140,7 @@ impl<'a> SegmentedMesh<'a> {
     }
 
     /// Surroundings of a segment.
-    pub fn around(&self, number: usize) -> Surroundings<'_> {
+    pub(crate) fn around(&self, number: usize) -> Surroundings<'_> {
         self.bodies.around(
             self.segment(number).faces.first().copied(),
             self.facets.mesh,
@@ -149,14 +149,24 @@ impl<'a> SegmentedMesh<'a> {
     }
 
     /// The segment of the face closest to `p` within `reach`, m.
-    pub fn segment_at(&self, around: &Surroundings, p: &Point3<f64>, reach: f64) -> Option<usize> {
+    pub(crate) fn segment_at(
+        &self,
+        around: &Surroundings,
+        p: &Point3<f64>,
+        reach: f64,
+    ) -> Option<usize> {
         let number = self.segmentation.of_face[around.closest(p, reach)? as usize];
         (number != NONE).then_some(number as usize)
     }
 
     /// Distance from `from` along the unit vector `direction` to the exit from a segment's surface,
     /// m; `None`: no hit, or a cone.
-    pub fn exit(&self, number: usize, from: &Point3<f64>, direction: &Vector3<f64>) -> Option<f64> {
+    pub(crate) fn exit(
+        &self,
+        number: usize,
+        from: &Point3<f64>,
+        direction: &Vector3<f64>,
+    ) -> Option<f64> {
         match &self.segment(number).primitive {
             Primitive::Plane(plane) => plane.along(from, direction),
             Primitive::Cylinder(cylinder) => cylinder.exit(from, direction),
@@ -165,7 +175,7 @@ impl<'a> SegmentedMesh<'a> {
     }
 
     /// Whether a segment is a cylinder with the material inside.
-    pub fn is_shaft(&self, number: usize) -> bool {
+    pub(crate) fn is_shaft(&self, number: usize) -> bool {
         matches!(self.segment(number).primitive, Primitive::Cylinder(cylinder) if !cylinder.concave)
     }
 
@@ -173,7 +183,7 @@ impl<'a> SegmentedMesh<'a> {
     /// `direction`, and its share of them.
     ///
     /// - as [`Self::plane_around`]
-    pub fn land_around(
+    pub(crate) fn land_around(
         &self,
         around: &Surroundings,
         middle: &Point3<f64>,
@@ -193,7 +203,7 @@ impl<'a> SegmentedMesh<'a> {
     ///
     /// - `middle`, `radii`: of the rings, square to `direction`, m
     /// - `reach`: maximum distance of the plane, m
-    pub fn plane_around(
+    pub(crate) fn plane_around(
         &self,
         around: &Surroundings,
         middle: &Point3<f64>,

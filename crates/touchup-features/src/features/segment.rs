@@ -27,7 +27,7 @@ pub(crate) struct Segment {
 
 /// All segments of a mesh.
 #[derive(Clone, Debug)]
-pub struct Segmentation {
+pub(crate) struct Segmentation {
     /// the largest first
     pub segments: Vec<Segment>,
     /// number of the segment of each face, by id; [`NONE`]: none

@@ -55,7 +55,7 @@ pub(super) struct Slot {
 impl Slot {
     /// Whether the middle of another void is between its walls, and both overlap over more than
     /// half of the depth of the shallower: their apparent depths may differ.
-    pub fn holds(&self, other: &Self) -> bool {
+    pub(crate) fn holds(&self, other: &Self) -> bool {
         let v = other.centre - self.centre;
         let middle = v - other.out * (other.depth / 2.0);
         let across = self.out.cross(&self.direction);

@@ -51,7 +51,7 @@ pub(super) const SAME_WALL: f64 = 2.0;
 
 impl Wall {
     /// All round walls of a mesh, the largest first.
-    pub fn all(facets: &Facets, segmentation: &Segmentation) -> Vec<Self> {
+    pub(crate) fn all(facets: &Facets, segmentation: &Segmentation) -> Vec<Self> {
         let mut walls: Vec<Self> = Vec::new();
         for number in 0..segmentation.segments.len() {
             let Some(wall) = Self::of(facets, segmentation, vec![number]) else {
@@ -96,7 +96,7 @@ impl Wall {
 
     /// The wall of these faces; `None` for a plane.
     #[expect(clippy::too_many_lines)]
-    pub fn of_faces(
+    pub(crate) fn of_faces(
         facets: &Facets,
         primitive: &Primitive,
         faces: &[u32],
@@ -190,7 +190,7 @@ impl Wall {
     }
 
     /// Whether the axes are one within a share of the radius.
-    pub fn is_coaxial(&self, other: &Self, share: f64) -> bool {
+    pub(crate) fn is_coaxial(&self, other: &Self, share: f64) -> bool {
         let middle = other.at(other.middle());
         let v = middle - self.origin;
         let off = (v - self.axis * v.dot(&self.axis)).norm();
@@ -199,7 +199,7 @@ impl Wall {
     }
 
     /// Distance between the walls along the axis, m; negative for an overlap.
-    pub fn gap(&self, other: &Self) -> f64 {
+    pub(crate) fn gap(&self, other: &Self) -> f64 {
         let along = other
             .ends
             .map(|t| (other.at(t) - self.origin).dot(&self.axis));
@@ -208,29 +208,29 @@ impl Wall {
     }
 
     /// Point of the axis, m.
-    pub fn at(&self, t: f64) -> Point3<f64> {
+    pub(crate) fn at(&self, t: f64) -> Point3<f64> {
         self.origin + self.axis * t
     }
 
-    pub fn middle(&self) -> f64 {
+    pub(crate) fn middle(&self) -> f64 {
         (self.ends[0] + self.ends[1]) / 2.0
     }
 
-    pub fn height(&self) -> f64 {
+    pub(crate) fn height(&self) -> f64 {
         self.ends[1] - self.ends[0]
     }
 
     /// m; of a cone at mid-height.
-    pub fn radius(&self) -> f64 {
+    pub(crate) fn radius(&self) -> f64 {
         self.radius_at(self.middle())
     }
 
     /// m
-    pub fn radius_at(&self, t: f64) -> f64 {
+    pub(crate) fn radius_at(&self, t: f64) -> f64 {
         self.radius_at_origin + self.half_angle.map_or(0.0, |angle| t * angle.tan())
     }
 
-    pub fn is_cone(&self) -> bool {
+    pub(crate) fn is_cone(&self) -> bool {
         self.half_angle.is_some()
     }
 }

@@ -338,7 +338,11 @@ impl Profile {
     /// - `blocks`: terms found together or not at all, behind the reference, the longest
     ///   undulations first.
     /// - returns: `None` if the points do not determine the reference.
-    pub fn of(rows: &[DesignRow], reference: usize, blocks: Vec<Range<usize>>) -> Option<Self> {
+    pub(crate) fn of(
+        rows: &[DesignRow],
+        reference: usize,
+        blocks: Vec<Range<usize>>,
+    ) -> Option<Self> {
         let count = blocks.last().map_or(reference, |last| last.end);
         let weighted =
             WeightedRows::of(rows, count).filter(|weighted| weighted.groups >= reference + 2)?;
@@ -388,7 +392,7 @@ impl Profile {
     /// - `places`: terms at the places of the deviation, all touched parts and nothing else.
     /// - `sizes`: of deviations at these, m.
     /// - returns: `None` if no block was a candidate.
-    pub fn sizes<const S: usize>(
+    pub(crate) fn sizes<const S: usize>(
         &self,
         blocks: impl Fn(usize) -> bool,
         places: &[Vec<f64>],
@@ -471,7 +475,7 @@ impl Profile {
     }
 
     /// Whether any of the blocks was a candidate.
-    pub fn has_sought(&self, blocks: impl Fn(usize) -> bool) -> bool {
+    pub(crate) fn has_sought(&self, blocks: impl Fn(usize) -> bool) -> bool {
         self.sought.iter().any(|number| blocks(*number))
     }
 }

@@ -293,7 +293,7 @@ pub fn cylindricity(
 
 /// Straightness of an axis, m (ISO 1101): diameter of the cylinder that encloses the middles of its
 /// sections. `None` for fewer than 3.
-pub fn axis_straightness(middles: &[Point3<f64>]) -> Option<Zone> {
+pub(crate) fn axis_straightness(middles: &[Point3<f64>]) -> Option<Zone> {
     let (from, [_, _, along]) = principal(middles).filter(|_| middles.len() > 2)?;
     let [u, v] = tangent_basis(&along);
     let local: Vec<(Vector2<f64>, f64)> = middles

@@ -30,7 +30,7 @@ pub(super) struct Journal {
 
 impl Journal {
     /// An empty journal with room for the given slots.
-    pub fn new(vertices: usize, faces: usize) -> Self {
+    pub(crate) fn new(vertices: usize, faces: usize) -> Self {
         Self {
             vertices: IdSet::with_slots(vertices),
             faces: IdSet::with_slots(faces),
@@ -40,30 +40,30 @@ impl Journal {
 
     /// Never inlined: most meshes have no journal.
     #[inline(never)]
-    pub fn note_vertex(&mut self, vertex: u32) {
+    pub(crate) fn note_vertex(&mut self, vertex: u32) {
         self.edits += 1;
         self.vertices.insert(vertex);
     }
 
     #[inline]
-    pub fn note_face(&mut self, face: u32) {
+    pub(crate) fn note_face(&mut self, face: u32) {
         self.edits += 1;
         self.faces.insert(face);
     }
 
     /// Moves up to `most` vertices and up to `most` faces to `into`; returns whether none remain.
-    pub fn take(&mut self, most: usize, into: &mut Changes) -> bool {
+    pub(crate) fn take(&mut self, most: usize, into: &mut Changes) -> bool {
         self.vertices
             .take(most, |vertex| into.vertices.push(VertexId(vertex)));
         self.faces.take(most, |face| into.faces.push(FaceId(face)));
         self.vertices.is_empty() && self.faces.is_empty()
     }
 
-    pub fn edits(&self) -> u64 {
+    pub(crate) fn edits(&self) -> u64 {
         self.edits
     }
 
-    pub fn bytes(&self) -> usize {
+    pub(crate) fn bytes(&self) -> usize {
         [&self.vertices, &self.faces]
             .map(|noted: &IdSet| 8 * noted.is_in.capacity() + 4 * noted.ids.capacity())
             .iter()

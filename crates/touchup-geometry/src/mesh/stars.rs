@@ -47,13 +47,13 @@ pub(super) struct Stars {
 impl Stars {
     /// The faces around a vertex.
     #[inline]
-    pub fn of(&self, vertex: u32) -> &[FaceId] {
+    pub(crate) fn of(&self, vertex: u32) -> &[FaceId] {
         let slot = self.slots[vertex as usize];
         &self.entries[slot.start as usize..(slot.start + slot.len) as usize]
     }
 
     /// Adds a vertex without faces: a new or a removed one.
-    pub fn add_vertex(&mut self, vertex: u32) {
+    pub(crate) fn add_vertex(&mut self, vertex: u32) {
         match self.slots.get_mut(vertex as usize) {
             Some(slot) => *slot = StarSlot::default(),
             None => self.slots.push(StarSlot::default()),
@@ -62,14 +62,14 @@ impl Stars {
 
     /// Whether a vertex exists.
     #[inline]
-    pub fn has(&self, vertex: u32) -> bool {
+    pub(crate) fn has(&self, vertex: u32) -> bool {
         self.slots
             .get(vertex as usize)
             .is_some_and(|slot| slot.capacity != NONE)
     }
 
     /// Removes a vertex that no face uses.
-    pub fn remove_vertex(&mut self, vertex: u32) {
+    pub(crate) fn remove_vertex(&mut self, vertex: u32) {
         let slot = std::mem::replace(&mut self.slots[vertex as usize], REMOVED);
         debug_assert_eq!(slot.len, 0);
         self.give_back(slot);
@@ -77,7 +77,7 @@ impl Stars {
 
     /// Whether one more face at each of three vertices surely fits.
     #[inline]
-    pub fn have_room(&self, corners: &[u32; 3]) -> bool {
+    pub(crate) fn have_room(&self, corners: &[u32; 3]) -> bool {
         self.growth(corners) <= LARGEST - self.entries.len()
     }
 
@@ -93,7 +93,7 @@ impl Stars {
 
     /// Adds a face to a star; see [`Self::have_room`].
     #[inline]
-    pub fn push(&mut self, vertex: u32, face: FaceId) {
+    pub(crate) fn push(&mut self, vertex: u32, face: FaceId) {
         let slot = self.slots[vertex as usize];
         if slot.len == slot.capacity {
             self.move_star(vertex, block_for(slot.len + 1));
@@ -105,7 +105,7 @@ impl Stars {
 
     /// Removes a face from a star that holds it.
     #[inline]
-    pub fn remove(&mut self, vertex: u32, face: FaceId) {
+    pub(crate) fn remove(&mut self, vertex: u32, face: FaceId) {
         let slot = &mut self.slots[vertex as usize];
         let star = &mut self.entries[slot.start as usize..(slot.start + slot.len) as usize];
         if let Some(at) = star.iter().position(|&f| f == face) {
@@ -159,7 +159,7 @@ impl Stars {
     }
 
     /// Makes room for more vertices and faces; `None` if memory is short.
-    pub fn reserve(&mut self, vertices: usize, faces: usize) -> Option<()> {
+    pub(crate) fn reserve(&mut self, vertices: usize, faces: usize) -> Option<()> {
         // each face is in three stars, of six faces in blocks of eight
         let entries = faces.checked_mul(4)?;
         self.slots.try_reserve(vertices).ok()?;
@@ -167,7 +167,7 @@ impl Stars {
     }
 
     /// Memory, bytes.
-    pub fn bytes(&self) -> usize {
+    pub(crate) fn bytes(&self) -> usize {
         self.slots.capacity() * size_of::<StarSlot>()
             + self.entries.capacity() * size_of::<FaceId>()
     }
@@ -185,31 +185,31 @@ pub(super) struct Valences(Vec<StarSlot>);
 
 impl Valences {
     /// No faces yet.
-    pub fn new(vertices: usize) -> Self {
+    pub(crate) fn new(vertices: usize) -> Self {
         Self(vec![StarSlot::default(); vertices])
     }
 
     /// Counts a face.
     #[inline]
-    pub fn add(&mut self, corners: &[u32; 3]) {
+    pub(crate) fn add(&mut self, corners: &[u32; 3]) {
         corners
             .iter()
             .for_each(|&v| self.0[v as usize].capacity += 1);
     }
 
     /// Whether each vertex has a face.
-    pub fn used(&self) -> impl Iterator<Item = bool> {
+    pub(crate) fn used(&self) -> impl Iterator<Item = bool> {
         self.0.iter().map(|slot| slot.capacity > 0)
     }
 
     /// Removes the vertices without a face.
-    pub fn retain_used(&mut self) {
+    pub(crate) fn retain_used(&mut self) {
         self.0.retain(|slot| slot.capacity > 0);
     }
 
     /// The faces around each vertex, in rising order; `faces`: the counted ones, at most
     /// [`MOST_FACES`].
-    pub fn stars_of(self, faces: &[[u32; 3]]) -> Stars {
+    pub(crate) fn stars_of(self, faces: &[[u32; 3]]) -> Stars {
         let mut slots = self.0;
         let mut end = 0;
         for slot in &mut slots {

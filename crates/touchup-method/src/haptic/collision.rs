@@ -35,7 +35,7 @@ pub(super) struct Pairs {
 
 impl Pairs {
     /// Forgets all pairs.
-    pub fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         self.list.clear();
         self.travel = 0.0;
     }
@@ -44,7 +44,7 @@ impl Pairs {
     /// unless they share an edge: neighbours fold, they do not pierce.
     ///
     /// - `is_smooth`: whether two faces in a fan around this vertex cannot meet.
-    pub fn add_near(
+    pub(crate) fn add_near(
         &mut self,
         mesh: &TriMesh,
         face: FaceId,
@@ -77,7 +77,7 @@ impl Pairs {
 
     /// Makes room for the pairs of `faces` moving faces: a dozen neighbours over a corner each, and
     /// some more.
-    pub fn reserve(&mut self, faces: usize) {
+    pub(crate) fn reserve(&mut self, faces: usize) {
         self.list.reserve(PAIRS_PER_FACE * faces);
     }
 
@@ -85,7 +85,7 @@ impl Pairs {
     ///
     /// - `gap`: distance below which faces meet, m.
     /// - `before`: position of a vertex before the update, m; a pair that met then may go on.
-    pub fn are_clear(
+    pub(crate) fn are_clear(
         &mut self,
         mesh: &TriMesh,
         gap: f64,
@@ -112,7 +112,7 @@ impl Pairs {
     /// update needs to test it.
     ///
     /// - `gap`: as in [`Self::are_clear`].
-    pub fn measure(&mut self, mesh: &TriMesh, gap: f64) {
+    pub(crate) fn measure(&mut self, mesh: &TriMesh, gap: f64) {
         let travel = self.travel;
         for pair in &mut self.list {
             let [t, u] = pair.faces.map(|face| mesh.triangle(face));
@@ -123,7 +123,7 @@ impl Pairs {
     }
 
     /// Takes an update whose largest step is `displacement` (m).
-    pub fn accept(&mut self, displacement: f64) {
+    pub(crate) fn accept(&mut self, displacement: f64) {
         self.travel += displacement;
     }
 }

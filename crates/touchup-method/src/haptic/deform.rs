@@ -110,7 +110,7 @@ impl DeformableMesh {
     }
 
     /// Memory, bytes.
-    pub fn footprint(&self) -> Footprint {
+    pub(crate) fn footprint(&self) -> Footprint {
         let scanned = self.scanned.capacity() * size_of::<Point3<f64>>();
         let evidence = self.evidence.capacity() * size_of::<[f32; 3]>();
         Footprint {
@@ -122,7 +122,7 @@ impl DeformableMesh {
 
     /// Closest face nearer than `reach` (m); faster near `hint`, and for `p` near the last query
     /// with `nearby`.
-    pub fn closest(
+    pub(crate) fn closest(
         &self,
         p: &Point3<f64>,
         hint: Option<FaceId>,
@@ -136,7 +136,7 @@ impl DeformableMesh {
     }
 
     /// Stores the normal measured on `face`.
-    pub fn note_normal(&mut self, face: FaceId, normal: &Vector3<f64>) {
+    pub(crate) fn note_normal(&mut self, face: FaceId, normal: &Vector3<f64>) {
         if let Some(strokes) = &mut self.strokes {
             strokes.note_evidence(face, self.evidence[face.0 as usize]);
         }
@@ -144,7 +144,7 @@ impl DeformableMesh {
     }
 
     /// An empty region with room for this size.
-    pub fn region(&mut self, size: RoiSize) -> HandleRegion {
+    pub(crate) fn region(&mut self, size: RoiSize) -> HandleRegion {
         let vertices = size.room(self.mean_edge);
         self.displacements.reserve(vertices);
         self.before.reserve(vertices);
@@ -159,7 +159,7 @@ impl DeformableMesh {
     }
 
     /// Makes `region` the region of `handle`, and checks it again after edits elsewhere.
-    pub fn prepare(&mut self, region: &mut HandleRegion, handle: FaceId) {
+    pub(crate) fn prepare(&mut self, region: &mut HandleRegion, handle: FaceId) {
         if region.roi.handle != Some(handle) {
             region
                 .roi
@@ -182,12 +182,12 @@ impl DeformableMesh {
     }
 
     /// Whether `region` is the region of `handle` in the current mesh.
-    pub fn is_prepared(&self, region: &HandleRegion, handle: FaceId) -> bool {
+    pub(crate) fn is_prepared(&self, region: &HandleRegion, handle: FaceId) -> bool {
         region.roi.handle == Some(handle) && region.seen == Some(self.edits)
     }
 
     /// Moves the corners of `handle` by `steps` (m) and the region around it after them.
-    pub fn deform(
+    pub(crate) fn deform(
         &mut self,
         region: &mut HandleRegion,
         handle: FaceId,
@@ -226,19 +226,19 @@ impl DeformableMesh {
     }
 
     /// Keeps an undo history of strokes from here on, unless there is a patch.
-    pub fn keep_strokes(&mut self) {
+    pub(crate) fn keep_strokes(&mut self) {
         self.strokes = self.patch.is_none().then(StrokeUndo::default);
     }
 
     /// Notes that the current sample is in contact.
-    pub fn touch(&mut self) {
+    pub(crate) fn touch(&mut self) {
         if let Some(strokes) = &mut self.strokes {
             strokes.touch(self.now_ns);
         }
     }
 
     /// Undoes the last stroke, or redoes the last undone one; returns whether there was one.
-    pub fn change_strokes(&mut self, is_undo: bool) -> bool {
+    pub(crate) fn change_strokes(&mut self, is_undo: bool) -> bool {
         let Self {
             strokes,
             mesh,
@@ -263,7 +263,7 @@ impl DeformableMesh {
     }
 
     /// Prepares to follow a patch, with room for `faces` new faces.
-    pub fn expect_patch(&mut self, faces: usize) -> Result<(), MeshError> {
+    pub(crate) fn expect_patch(&mut self, faces: usize) -> Result<(), MeshError> {
         self.mesh.reserve(faces / 2, faces)?;
         self.tree.reserve(faces)?;
         self.scanned.reserve(faces / 2);
@@ -275,7 +275,7 @@ impl DeformableMesh {
 
     /// Whether all corners of a face were touched: the patch alone moves it then.
     #[inline]
-    pub fn is_stiff(&self, face: FaceId) -> bool {
+    pub(crate) fn is_stiff(&self, face: FaceId) -> bool {
         self.patch.as_ref().is_some_and(|patch| {
             self.mesh
                 .corners(face)
@@ -286,7 +286,7 @@ impl DeformableMesh {
 
     /// Begins to take up the changes of the patch: vertices that moved last before them return to
     /// their scanned or patch positions; returns whether there were any.
-    pub fn begin_delta(&mut self, delta: &PatchDelta) -> bool {
+    pub(crate) fn begin_delta(&mut self, delta: &PatchDelta) -> bool {
         let Self {
             patch: Some(patch),
             mesh,
@@ -324,7 +324,7 @@ impl DeformableMesh {
 
     /// Takes up to `most` more parts of the changes, as [`crate::reconstruct::Splice::go_on`];
     /// returns whether they are complete.
-    pub fn go_on(&mut self, delta: &PatchDelta, most: usize) -> Result<bool, MeshError> {
+    pub(crate) fn go_on(&mut self, delta: &PatchDelta, most: usize) -> Result<bool, MeshError> {
         let Self {
             patch: Some(patch),
             mesh,

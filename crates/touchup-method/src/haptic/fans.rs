@@ -39,7 +39,7 @@ struct CornerFan {
 
 impl Fans {
     /// Makes room for the corners of `faces` moving faces.
-    pub fn reserve(&mut self, faces: usize) {
+    pub(crate) fn reserve(&mut self, faces: usize) {
         self.list.reserve(faces);
         self.moving.reserve(3 * faces);
         self.corners.reserve(2 * faces);
@@ -49,7 +49,7 @@ impl Fans {
     /// Finds the fans whose normals are within `smallest_cosine` of their mean.
     ///
     /// - `normal`: unit normal of a ring face by its number.
-    pub fn find(
+    pub(crate) fn find(
         &mut self,
         mesh: &TriMesh,
         ring: &Ring,
@@ -85,7 +85,7 @@ impl Fans {
 
     /// Whether the faces around this corner of a moving face need no test by pairs.
     #[inline]
-    pub fn is_smooth(&self, corner: VertexId) -> bool {
+    pub(crate) fn is_smooth(&self, corner: VertexId) -> bool {
         self.corners
             .of(corner.0)
             .is_some_and(|number| self.are_smooth[number as usize])
@@ -96,7 +96,7 @@ impl Fans {
     /// - `normal`: unit normal of a moving face after the update, by its number; a fan is smooth
     ///   within `smallest_cosine` of the mean.
     /// - `gap`, `before`: as in [`super::collision::Pairs::are_clear`].
-    pub fn are_clear(
+    pub(crate) fn are_clear(
         &self,
         mesh: &TriMesh,
         smallest_cosine: f64,

@@ -44,25 +44,25 @@ impl FollowedPatch {
     }
 
     /// Memory of the data per vertex, bytes.
-    pub fn bytes(&self) -> usize {
+    pub(crate) fn bytes(&self) -> usize {
         self.support.capacity() * size_of::<Support>()
             + self.moved_ns.capacity() * size_of::<i64>()
             + self.moved.capacity() * size_of::<VertexId>()
     }
 
     #[inline]
-    pub fn is_touched(&self, vertex: VertexId) -> bool {
+    pub(crate) fn is_touched(&self, vertex: VertexId) -> bool {
         self.support(vertex) == Support::Touched
     }
 
     /// Support of a vertex in the patch.
     #[inline]
-    pub fn support(&self, vertex: VertexId) -> Support {
+    pub(crate) fn support(&self, vertex: VertexId) -> Support {
         self.support[vertex.0 as usize]
     }
 
     /// Records the motion of these vertices.
-    pub fn note_moved(&mut self, vertices: &[VertexId], stamp_ns: i64) {
+    pub(crate) fn note_moved(&mut self, vertices: &[VertexId], stamp_ns: i64) {
         for &vertex in vertices {
             let moved_ns = &mut self.moved_ns[vertex.0 as usize];
             if *moved_ns == NEVER {

@@ -154,7 +154,7 @@ fn shape_of(mesh: &TriMesh, face: FaceId) -> FaceShape {
 impl Neighbourhood {
     /// Makes room for a region of `vertices` vertices: two to three faces each, three edges for two
     /// faces.
-    pub fn reserve(&mut self, vertices: usize) {
+    pub(crate) fn reserve(&mut self, vertices: usize) {
         let faces = 3 * vertices;
         self.before.reserve(faces);
         self.after.reserve(faces);
@@ -170,7 +170,7 @@ impl Neighbourhood {
     /// [`Self::bound_unseen`].
     ///
     /// - `gap`: as in [`GuardEvidence`].
-    pub fn refresh(&mut self, mesh: &TriMesh, tree: &FaceTree, margin: f64, gap: f64) {
+    pub(crate) fn refresh(&mut self, mesh: &TriMesh, tree: &FaceTree, margin: f64, gap: f64) {
         self.before.clear();
         self.before
             .extend(self.ring.faces.iter().map(|&face| shape_of(mesh, face)));
@@ -183,7 +183,7 @@ impl Neighbourhood {
 
     /// Bounds the unchecked motion of the vertices of a refreshed region; `evidence` as in
     /// [`Self::judge`].
-    pub fn bound_unseen(&mut self, mesh: &TriMesh, evidence: &GuardEvidence) {
+    pub(crate) fn bound_unseen(&mut self, mesh: &TriMesh, evidence: &GuardEvidence) {
         if let Some(mean) = self.smooth {
             self.after.clear();
             self.after
@@ -195,7 +195,7 @@ impl Neighbourhood {
 
     /// Finds other faces within `margin` (m), which both sides of a pair may use up but for the
     /// gap; `gap` as in [`GuardEvidence`].
-    pub fn collect(&mut self, mesh: &TriMesh, tree: &FaceTree, margin: f64, gap: f64) {
+    pub(crate) fn collect(&mut self, mesh: &TriMesh, tree: &FaceTree, margin: f64, gap: f64) {
         self.allowance = 0.5 * (margin - gap);
         self.find_near(mesh, tree, margin);
         self.smooth = self.smooth_normal(mesh);
@@ -206,7 +206,7 @@ impl Neighbourhood {
 
     /// Gives up the claim to be smooth: tests pairs of faces from now on; parameters as of
     /// [`Self::collect`].
-    pub fn roughen(&mut self, mesh: &TriMesh, tree: &FaceTree, margin: f64, gap: f64) {
+    pub(crate) fn roughen(&mut self, mesh: &TriMesh, tree: &FaceTree, margin: f64, gap: f64) {
         self.allowance = 0.5 * (margin - gap);
         self.smooth = None;
         self.find_near(mesh, tree, margin);
@@ -294,7 +294,7 @@ impl Neighbourhood {
     /// Takes a motion of the vertices by `displacement` (m) if it needs no check; returns whether
     /// it took it.
     #[inline]
-    pub fn pass_unseen(&mut self, displacement: f64) -> bool {
+    pub(crate) fn pass_unseen(&mut self, displacement: f64) -> bool {
         let passes = displacement <= self.unseen;
         if passes {
             self.unseen -= displacement;
@@ -307,7 +307,7 @@ impl Neighbourhood {
     ///
     /// - `displacement`: largest motion of a vertex in the update, m.
     /// - `before`: position of a vertex before the update, m.
-    pub fn judge(
+    pub(crate) fn judge(
         &mut self,
         mesh: &TriMesh,
         evidence: &GuardEvidence,
@@ -422,7 +422,7 @@ impl Neighbourhood {
 
     /// Takes the checked state as the new state before; `displacement` is the largest motion of a
     /// vertex, m.
-    pub fn accept(&mut self, displacement: f64) {
+    pub(crate) fn accept(&mut self, displacement: f64) {
         self.before[..self.ring.moving].copy_from_slice(&self.after);
         self.suspects.accept(displacement);
         self.allowance -= displacement;
@@ -430,7 +430,7 @@ impl Neighbourhood {
 
     /// Whether a motion of `displacement` (m) needs a new collection of the nearby faces.
     #[inline]
-    pub fn is_outdated(&self, displacement: f64) -> bool {
+    pub(crate) fn is_outdated(&self, displacement: f64) -> bool {
         self.allowance < displacement
     }
 }

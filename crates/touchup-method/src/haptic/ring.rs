@@ -47,7 +47,7 @@ struct RingCount {
 
 impl Ring {
     /// Makes room for moving `vertices`: two to three faces each, three edges for two faces.
-    pub fn reserve(&mut self, vertices: usize) {
+    pub(crate) fn reserve(&mut self, vertices: usize) {
         let faces = 3 * vertices;
         self.faces.reserve(faces);
         self.known.reserve(faces);
@@ -61,22 +61,22 @@ impl Ring {
     }
 
     /// Faces with a moving vertex.
-    pub fn moving(&self) -> &[FaceId] {
+    pub(crate) fn moving(&self) -> &[FaceId] {
         &self.faces[..self.moving]
     }
 
     /// Number of a face.
-    pub fn number_of(&self, face: FaceId) -> Option<u32> {
+    pub(crate) fn number_of(&self, face: FaceId) -> Option<u32> {
         self.known.of(face.0)
     }
 
     /// Neighbours of the moving vertex `vertex`.
-    pub fn neighbours(&self, vertex: usize) -> &[u32] {
+    pub(crate) fn neighbours(&self, vertex: usize) -> &[u32] {
         &self.neighbours[self.starts[vertex]..self.starts[vertex + 1]]
     }
 
     /// Numbers the faces around the moving vertices.
-    pub fn gather(&mut self, mesh: &TriMesh, vertices: &[VertexId]) {
+    pub(crate) fn gather(&mut self, mesh: &TriMesh, vertices: &[VertexId]) {
         self.known.clear();
         self.faces.clear();
         self.stars.clear();
@@ -93,7 +93,12 @@ impl Ring {
 
     /// Finds the connectivity for the same vertices, which have the first numbers in `scratch_map`;
     /// their neighbours get the next.
-    pub fn link(&mut self, mesh: &TriMesh, vertices: &[VertexId], scratch_map: &mut ScratchMap) {
+    pub(crate) fn link(
+        &mut self,
+        mesh: &TriMesh,
+        vertices: &[VertexId],
+        scratch_map: &mut ScratchMap,
+    ) {
         self.corners.clear();
         self.corners.extend(
             self.faces

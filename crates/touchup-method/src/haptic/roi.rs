@@ -62,7 +62,7 @@ impl RoiSize {
 
 impl Roi {
     /// A region with room for `vertices`.
-    pub fn with_room(vertices: usize) -> Self {
+    pub(crate) fn with_room(vertices: usize) -> Self {
         let mut roi = Self::default();
         roi.vertices.reserve(vertices);
         roi.weights.reserve(vertices);
@@ -74,7 +74,13 @@ impl Roi {
 
     /// Builds the region of `handle`; finds the connectivity of its faces only for free vertices or
     /// a guard.
-    pub fn rebuild(&mut self, mesh: &TriMesh, handle: FaceId, size: RoiSize, is_guarded: bool) {
+    pub(crate) fn rebuild(
+        &mut self,
+        mesh: &TriMesh,
+        handle: FaceId,
+        size: RoiSize,
+        is_guarded: bool,
+    ) {
         self.handle = Some(handle);
         self.numbers.clear();
         self.vertices.clear();

@@ -24,7 +24,7 @@ const FIRST_ROOM: usize = 256;
 
 impl ScratchMap {
     /// Forgets everything.
-    pub fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         if self.entries.is_empty() {
             self.entries.resize(FIRST_ROOM, Entry::default());
         }
@@ -57,14 +57,14 @@ impl ScratchMap {
 
     /// The number of `key`.
     #[inline]
-    pub fn of(&self, key: u32) -> Option<u32> {
+    pub(crate) fn of(&self, key: u32) -> Option<u32> {
         let entry = self.entries[self.slot(key)];
         (entry.tag == self.tag(key)).then_some(entry.number)
     }
 
     /// Numbers of `keys`; new keys get the next ones.
     #[inline]
-    pub fn number<const N: usize>(&mut self, keys: [u32; N]) -> [u32; N] {
+    pub(crate) fn number<const N: usize>(&mut self, keys: [u32; N]) -> [u32; N] {
         let mut len = self.len;
         let numbers = keys.map(|key| {
             let at = self.slot(key);
@@ -83,7 +83,7 @@ impl ScratchMap {
     }
 
     /// Takes back the numbers of `keys`, which must be the last ones.
-    pub fn take_back<const N: usize>(&mut self, keys: [u32; N]) {
+    pub(crate) fn take_back<const N: usize>(&mut self, keys: [u32; N]) {
         for key in keys.into_iter().rev() {
             let at = self.slot(key);
             self.entries[at] = Entry::default();
@@ -92,12 +92,12 @@ impl ScratchMap {
     }
 
     /// Number of keys.
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.len
     }
 
     /// Makes room for `count` keys.
-    pub fn reserve(&mut self, count: usize) {
+    pub(crate) fn reserve(&mut self, count: usize) {
         while self.entries.len() < 2 * count {
             self.grow();
         }

@@ -29,7 +29,7 @@ impl Default for StrokeUndo {
 
 impl StrokeUndo {
     /// Begins a stroke if the contact at `stamp_ns` follows a pause.
-    pub fn touch(&mut self, stamp_ns: i64) {
+    pub(crate) fn touch(&mut self, stamp_ns: i64) {
         if self
             .last_contact_ns
             .is_none_or(|last| stamp_ns.saturating_sub(last) > STROKE_PAUSE_NS)
@@ -41,20 +41,20 @@ impl StrokeUndo {
     }
 
     /// Keeps the positions of vertices before they move.
-    pub fn note_positions(&mut self, vertices: &[VertexId], mesh: &TriMesh) {
+    pub(crate) fn note_positions(&mut self, vertices: &[VertexId], mesh: &TriMesh) {
         for &vertex in vertices {
             self.positions.note(vertex.0, || mesh.position(vertex));
         }
     }
 
     /// Keeps the known normal of a face before a new measurement.
-    pub fn note_evidence(&mut self, face: FaceId, before: [f32; 3]) {
+    pub(crate) fn note_evidence(&mut self, face: FaceId, before: [f32; 3]) {
         self.evidence.note(face.0, || before);
     }
 
     /// Undoes the last stroke, or redoes the last undone one, by exchanging its state with the
     /// current one; returns the vertices that moved, `None` without a stroke.
-    pub fn change(
+    pub(crate) fn change(
         &mut self,
         is_undo: bool,
         mesh: &mut TriMesh,

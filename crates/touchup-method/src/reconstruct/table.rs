@@ -43,12 +43,12 @@ impl<K: Key, V> CellTable<K, V> {
     }
 
     /// Whether the table is empty.
-    pub fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.entries.is_empty()
     }
 
     /// Forgets all keys.
-    pub fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         self.entries.clear();
         self.slots.truncate(FIRST_ROOM);
         self.slots.fill(EMPTY);
@@ -91,7 +91,7 @@ impl<K: Key, V> CellTable<K, V> {
 
     /// Whether the table holds `key`.
     #[inline]
-    pub fn contains(&self, key: &K) -> bool {
+    pub(crate) fn contains(&self, key: &K) -> bool {
         self.slots[self.slot(key)] != EMPTY
     }
 
@@ -103,7 +103,7 @@ impl<K: Key, V> CellTable<K, V> {
 
     /// Mutable value of `key`.
     #[inline]
-    pub fn get_mut(&mut self, key: &K) -> Option<&mut V> {
+    pub(crate) fn get_mut(&mut self, key: &K) -> Option<&mut V> {
         self.index_of(key)
             .map(|at| &mut self.entries[at as usize].1)
     }
@@ -133,7 +133,7 @@ impl<K: Key, V> CellTable<K, V> {
 
     /// Mutable value of `key`; inserts the default if absent.
     #[inline]
-    pub fn get_or_default(&mut self, key: K) -> &mut V
+    pub(crate) fn get_or_default(&mut self, key: K) -> &mut V
     where
         V: Default,
     {
@@ -151,7 +151,7 @@ impl<K: Key, V> CellTable<K, V> {
     }
 
     /// Removes `key`; the key inserted last takes its number. Returns its value.
-    pub fn remove(&mut self, key: &K) -> Option<V> {
+    pub(crate) fn remove(&mut self, key: &K) -> Option<V> {
         let slot = self.slot(key);
         let at = self.slots[slot];
         if at == EMPTY {

@@ -99,12 +99,12 @@ impl ContactSample {
     }
 
     /// State by the unsmoothed force.
-    pub fn state(&self) -> TouchState {
+    pub(crate) fn state(&self) -> TouchState {
         state_of(self.contact, self.is_free)
     }
 
     /// State by the causally smoothed force.
-    pub fn ball_state(&self) -> TouchState {
+    pub(crate) fn ball_state(&self) -> TouchState {
         state_of(self.ball_contact, self.is_free)
     }
 }

@@ -21,7 +21,7 @@ pub(crate) struct ForceNoise {
 
 impl ForceNoise {
     /// Noise of a usual sensor.
-    pub(crate) fn new() -> Self {
+    pub fn new() -> Self {
         Self {
             step: RunningMedian {
                 length: USUAL_STEP,

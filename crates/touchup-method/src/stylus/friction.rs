@@ -19,7 +19,7 @@ use touchup_geometry::numeric::direction;
 /// Cosine of the widest friction cone accepted by default: cos 24° (μ = 0.45, dry metal on metal).
 /// It bounds the angle between normal and force, for the haptic update and for the evidence of the
 /// reconstruction.
-pub const WIDEST_CONE_COSINE: f64 = 0.9135;
+pub(crate) const WIDEST_CONE_COSINE: f64 = 0.9135;
 
 /// Velocity and contact force of the ball at one instant, averaged over a short time.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -204,7 +204,7 @@ impl Friction {
     }
 
     /// Notes that the ball has left the surface: the next contact begins another stretch.
-    pub fn lift(&mut self) {
+    pub(crate) fn lift(&mut self) {
         self.stretch = SlidingStretch::default();
     }
 

@@ -35,24 +35,31 @@ pub use clocks::clock_offset::{ClockDrift, ClockEvidence, ClockOffset};
 pub use compensate::{
     Compensator, CompensatorParams, Payload, SensorBias, SensorMount, Tip, WrenchFrame,
 };
-pub use contact::{Contact, ContactGate, ContactGateParams, TouchState};
+pub use contact::Contact;
+pub use contact::TouchState;
+pub use contact::{ContactGate, ContactGateParams};
 pub(crate) use contact::{LONGEST_HOLD, STROKE_PAUSE_NS};
 pub use contact_estimator::{ContactEstimator, ContactEstimatorParams, ContactSample};
 pub(crate) use force_noise::ForceNoise;
 pub use frame_buffer::{FrameBuffer, FrameError, FrameTransform, plain_name};
-pub use friction::{Friction, FrictionCoefficient, NormalEstimate, Sliding, WIDEST_CONE_COSINE};
-pub use local_motion::{LocalMotion, SmoothedMotion};
+pub use friction::NormalEstimate;
+pub(crate) use friction::WIDEST_CONE_COSINE;
+pub use friction::{Friction, FrictionCoefficient, Sliding};
+pub use local_motion::LocalMotion;
+pub use local_motion::SmoothedMotion;
 pub use markers::{
-    MOST_MARKERS, MarkerBody, MarkerCounts, MarkerFilter, MarkerFrame, MarkerObservation,
-    MarkerParams, SpringParams, Tracking,
+    MarkerBody, MarkerCounts, MarkerFilter, MarkerFrame, MarkerObservation, MarkerParams,
+    SpringParams, Tracking,
 };
 pub use moving_frame::MovingFrame;
 pub use placement::Placement;
 pub use probed::ProbedPoint;
 pub use sync::Synchroniser;
 pub use sync_params::{SyncCounts, SyncParams};
-pub use tip_motion::{Ball, SlidingParams, TipMotion, TipParams};
-pub use tip_shape::{TipBody, TipContact, TipPlace, TipShape, TipSizes};
+pub use tip_motion::Ball;
+pub use tip_motion::{SlidingParams, TipMotion, TipParams};
+pub(crate) use tip_shape::TipContact;
+pub use tip_shape::{TipBody, TipPlace, TipShape, TipSizes};
 
 pub use crate::parameters::SettingError;
 
@@ -65,7 +72,7 @@ pub const LARGEST_POSITION: f64 = 1e3;
 
 /// Largest component of a valid force, N: a hundred times the force of a hand-held stylus or a
 /// small arm.
-pub const LARGEST_FORCE: f64 = 1e5;
+pub(crate) const LARGEST_FORCE: f64 = 1e5;
 
 /// Largest component of a valid torque, N·m: [`LARGEST_FORCE`] at a lever of one metre.
 pub(crate) const LARGEST_TORQUE: f64 = 1e5;
@@ -208,7 +215,7 @@ impl StampedWrench {
     ///
     /// # Errors
     /// [`SampleError::NotFinite`], [`SampleError::Absurd`].
-    pub fn check(&self) -> Result<(), SampleError> {
+    pub(crate) fn check(&self) -> Result<(), SampleError> {
         check_vector(
             "force",
             &self.wrench.force,

@@ -45,7 +45,7 @@ impl<T: StampedMessage + Copy> Stream<T> {
     ///
     /// A message that leaps ahead waits for others that agree: one wrong stamp would make all
     /// correct ones late until its time.
-    pub fn push(&mut self, message: T, params: &SyncParams) -> bool {
+    pub(crate) fn push(&mut self, message: T, params: &SyncParams) -> bool {
         let stamp = message.stamp_ns();
         let leap_ns = params.largest_jump_ns.max(params.reorder_ns);
         if self
@@ -79,7 +79,7 @@ impl<T: StampedMessage + Copy> Stream<T> {
     }
 
     /// Ends the stream; keeps messages that no other contradicts.
-    pub fn finish(&mut self, params: &SyncParams) {
+    pub(crate) fn finish(&mut self, params: &SyncParams) {
         let reached = self
             .newest
             .map(|newest| newest.saturating_add(LONGEST_PAUSE_NS));
@@ -92,7 +92,7 @@ impl<T: StampedMessage + Copy> Stream<T> {
     }
 
     /// Stamp of the newest accepted message, ns.
-    pub fn newest_ns(&self) -> Option<i64> {
+    pub(crate) fn newest_ns(&self) -> Option<i64> {
         self.newest
     }
 
@@ -139,7 +139,7 @@ impl<T: StampedMessage + Copy> Stream<T> {
     }
 
     /// Drops the messages before the last one at or before `stamp_ns`.
-    pub fn forget_before(&mut self, stamp_ns: i64) {
+    pub(crate) fn forget_before(&mut self, stamp_ns: i64) {
         while self
             .held
             .get(1)
@@ -149,7 +149,7 @@ impl<T: StampedMessage + Copy> Stream<T> {
         }
     }
 
-    pub fn pop(&mut self) {
+    pub(crate) fn pop(&mut self) {
         if let Some(gone) = self.held.pop_front() {
             self.watermark = self.watermark.max(gone.stamp_ns());
         }

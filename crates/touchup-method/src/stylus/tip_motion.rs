@@ -23,7 +23,7 @@ parameters! {
 
 impl TipParams {
     /// Real ball centre, m: the pose assumes a rigid stylus, and the force F bends it back by F/k.
-    pub fn centre(&self, reported: &Point3<f64>, force_o: &Vector3<f64>) -> Point3<f64> {
+    pub(crate) fn centre(&self, reported: &Point3<f64>, force_o: &Vector3<f64>) -> Point3<f64> {
         self.stiffness
             .map_or(*reported, |stiffness| reported + force_o / stiffness)
     }
@@ -132,7 +132,7 @@ impl TipMotion {
     }
 
     /// The ball of a single tip, for uses without velocity: no smoothing, no state.
-    pub fn unfiltered(&self, tip: &Tip) -> Ball {
+    pub(crate) fn unfiltered(&self, tip: &Tip) -> Ball {
         let (reported, force_o) = (Point3::from(tip.pose_ot.translation.vector), tip.force_o);
         let centre = self.tip.centre(&reported, &force_o);
         Ball {
@@ -167,13 +167,13 @@ impl TipMotion {
     }
 
     /// Notes that the ball is free.
-    pub fn lift(&mut self) {
+    pub(crate) fn lift(&mut self) {
         self.touched_for = 0.0;
         self.friction.lift();
     }
 
     /// Measured kinetic friction; `None` until the ball has slid far enough.
-    pub fn friction(&self) -> Option<FrictionCoefficient> {
+    pub(crate) fn friction(&self) -> Option<FrictionCoefficient> {
         self.friction.coefficient()
     }
 }

@@ -54,7 +54,7 @@ impl From<&Isometry3<f64>> for TipPlace {
 
 /// Contact of a tip with a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TipContact {
+pub(crate) struct TipContact {
     /// point of the surface, m, in O
     pub point: Point3<f64>,
     /// outward normal of the surface, unit, in O
@@ -108,7 +108,7 @@ const ON_AXIS: f64 = 1e-9;
 
 impl TipBody {
     /// A ball of `radius` (m).
-    pub fn ball(radius: f64) -> Self {
+    pub(crate) fn ball(radius: f64) -> Self {
         let core = Vector2::zeros();
         Self {
             shape: TipShape::Ball,
@@ -298,7 +298,7 @@ impl TipBody {
     /// A flat end touches with its whole face if its axis may be the normal, else with the point of
     /// its rim; the side of a cylinder may lie on a wall or lean on an edge. `None` for the flank
     /// of a cone and the shaft behind it: the force does not determine the point along it.
-    pub fn touched(
+    pub(crate) fn touched(
         &self,
         place: &TipPlace,
         normal: &Vector3<f64>,
@@ -356,7 +356,7 @@ impl TipBody {
     }
 
     /// Height on the axis of the centre of a ball that holds the tip, and its radius, m.
-    pub fn bound(&self) -> (f64, f64) {
+    pub(crate) fn bound(&self) -> (f64, f64) {
         let half = 0.5 * (self.high.y - self.low.y);
         let widest = self.low.x.max(self.high.x);
         (self.low.y + half, widest.hypot(half) + self.round)

@@ -91,7 +91,7 @@ impl<'a> ArmBodies<'a> {
     }
 
     /// Links and capsules, from the base outward.
-    pub fn links(&self) -> impl Iterator<Item = (&Link, &Capsule)> {
+    pub(crate) fn links(&self) -> impl Iterator<Item = (&Link, &Capsule)> {
         self.links.iter().map(|(link, capsule)| (link, capsule))
     }
 

@@ -13,7 +13,7 @@ pub struct Capsule {
 
 impl Capsule {
     /// Gap between two capsules, m; negative if they overlap.
-    pub fn gap(&self, other: &Self) -> f64 {
+    pub(crate) fn gap(&self, other: &Self) -> f64 {
         segment_distance(&self.ends, &other.ends) - self.radius - other.radius
     }
 

@@ -59,7 +59,7 @@ pub(super) struct Liveness {
 
 impl Liveness {
     /// Takes a state; returns the stuck force, if any.
-    pub fn take(&mut self, state: &ArmState) -> Option<StuckForce> {
+    pub(crate) fn take(&mut self, state: &ArmState) -> Option<StuckForce> {
         let (force_b, now) = (state.wrench_b.force, state.stamp_ns);
         let force_t = state.pose_bt.rotation.inverse() * force_b;
         let forces = [force_b, force_t, state.raw_wrench_f.force];

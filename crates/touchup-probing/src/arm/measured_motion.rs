@@ -26,7 +26,7 @@ impl MeasuredMotion {
     ///
     /// # Errors
     /// [`LimitError::Speed`], [`LimitError::JointSpeed`]; also for NaN.
-    pub fn take(&mut self, state: &ArmState, limits: &Limits) -> Result<(), LimitError> {
+    pub(crate) fn take(&mut self, state: &ArmState, limits: &Limits) -> Result<(), LimitError> {
         let place = state.pose_bt.translation.vector;
         self.recent.push_back((state.stamp_ns, place, state.joints));
         if self.recent.len() <= WINDOW {
@@ -60,7 +60,7 @@ impl MeasuredMotion {
     }
 
     /// Forgets past states: the next ones need not follow them.
-    pub fn forget(&mut self) {
+    pub(crate) fn forget(&mut self) {
         self.recent.clear();
     }
 }

@@ -36,7 +36,7 @@ pub use limits::{LimitError, Limits, RequestLimits};
 pub use liveness::StuckForce;
 pub use obedience::{Obedience, OrderedMotion};
 pub use onset::{Onset, OnsetError, OnsetParams, OnsetVerdict, TouchMoment, find_onset};
-pub use serial_chain::{ChainError, ChainJoint, ChainLink, IkFailure, Jacobian, SerialChain};
+pub use serial_chain::{ChainError, ChainJoint, ChainLink, IkFailure, SerialChain};
 pub use sliding::{SlideEnding, SlideRecord, SlideTarget};
 pub use straight_line::velocity_towards;
 pub use touch_params::{CRAWL, TouchParams, UNEXPECTED};

@@ -16,7 +16,7 @@ use super::joints::{Joints, MOST_JOINTS, largest_turn};
 
 /// Velocity of a frame by the joint velocities: three rows of m/s, three of rad/s, a column for
 /// each joint, then zeros.
-pub type Jacobian = SMatrix<f64, 6, MOST_JOINTS>;
+pub(crate) type Jacobian = SMatrix<f64, 6, MOST_JOINTS>;
 
 /// A revolute joint.
 #[derive(Clone, Debug, PartialEq)]
@@ -301,7 +301,7 @@ impl SerialChain {
     }
 
     /// Velocity of the flange by the joint velocities, in B.
-    pub fn jacobian(&self, joints: &Joints) -> Jacobian {
+    pub(crate) fn jacobian(&self, joints: &Joints) -> Jacobian {
         self.jacobian_at(&self.frames(joints))
     }
 
@@ -321,7 +321,7 @@ impl SerialChain {
 
     /// Distance from a singularity: the smallest singular value of the Jacobian, lengths in units
     /// of the arm from its second joint on.
-    pub fn dexterity(&self, joints: &Joints) -> f64 {
+    pub(crate) fn dexterity(&self, joints: &Joints) -> f64 {
         let mut jacobian = self.jacobian(joints);
         jacobian.rows_mut(0, 3).scale_mut(1.0 / self.reach);
         // six rows, for any number of zero columns

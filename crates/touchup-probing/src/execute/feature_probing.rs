@@ -165,7 +165,7 @@ impl<'p, 'a> FeatureProbing<'p, 'a> {
     ///
     /// - `flag`: its number; `rotation`: of the tip in B for the touches; `state`: of the arm, in
     ///   free air.
-    pub fn new(
+    pub(crate) fn new(
         prober: &'p mut Prober<'a>,
         flag: u32,
         rotation: UnitQuaternion<f64>,
@@ -195,22 +195,22 @@ impl<'p, 'a> FeatureProbing<'p, 'a> {
 impl FeatureProbing<'_, '_> {
     /// Records data of a motion, also if it ended early: the largest force, N, and the stamp of the
     /// last state, ns.
-    pub fn keep(&mut self, (peak_force, seen_ns): (f64, Option<i64>)) {
+    pub(crate) fn keep(&mut self, (peak_force, seen_ns): (f64, Option<i64>)) {
         self.peak_force = self.peak_force.max(peak_force);
         self.ended_ns = seen_ns.unwrap_or(self.ended_ns).max(self.ended_ns);
     }
 
-    pub fn seconds(&self) -> f64 {
+    pub(crate) fn seconds(&self) -> f64 {
         (self.ended_ns - self.begun_ns) as f64 * 1e-9
     }
 
     /// Whether the time for a feature is over.
-    pub fn is_spent(&self) -> bool {
+    pub(crate) fn is_spent(&self) -> bool {
         self.seconds() > self.prober.params.limits.time
     }
 
     /// Retracts if the arm may move.
-    pub fn finish<T>(&mut self, ended: Result<T, Ending>) -> Result<T, Ending> {
+    pub(crate) fn finish<T>(&mut self, ended: Result<T, Ending>) -> Result<T, Ending> {
         use Ending::{Cancelled, NoClearPath, OutOfLimits, Stopped, TimeSpent};
         // a failed retraction outranks these
         let is_unbroken = matches!(
@@ -237,7 +237,7 @@ impl FeatureProbing<'_, '_> {
     }
 
     /// One touch by itself: there, and back into free air.
-    pub fn touch_and_retract(&mut self, planned: &TouchPlan) -> Result<ProbedTouch, Ending> {
+    pub(crate) fn touch_and_retract(&mut self, planned: &TouchPlan) -> Result<ProbedTouch, Ending> {
         // zeroed again for each, as the touches are independent
         self.is_zeroed = false;
         let (_, touched) = self.go_and_touch(planned)?;
@@ -368,7 +368,7 @@ impl FeatureProbing<'_, '_> {
     }
 
     /// Brings the ball to the entry of a touch, and touches.
-    pub fn go_and_touch(
+    pub(crate) fn go_and_touch(
         &mut self,
         planned: &TouchPlan,
     ) -> Result<(TouchResult, ProbedTouch), Ending> {
@@ -388,7 +388,7 @@ impl FeatureProbing<'_, '_> {
     }
 
     /// Goes out of the feature, and through free air to a place above it.
-    pub fn reach(&mut self, above: &Point3<f64>) -> Result<(), Ending> {
+    pub(crate) fn reach(&mut self, above: &Point3<f64>) -> Result<(), Ending> {
         self.prober.world.enter(Phase::Link);
         self.go_out("going up out of the feature", LineGuard::Out)?;
         let route = self
@@ -508,7 +508,7 @@ impl FeatureProbing<'_, '_> {
 
     /// Goes back through the past places of the ball, none of them twice, even after an early end
     /// of the remaining path.
-    pub fn go_out(&mut self, doing: &'static str, guard: LineGuard) -> Result<(), Ending> {
+    pub(crate) fn go_out(&mut self, doing: &'static str, guard: LineGuard) -> Result<(), Ending> {
         while !self.is_out {
             let place = self.from.or(self.entry).unwrap_or(self.out.place);
             let pose = self.prober.cell.pose(&self.rotation, &place);

@@ -130,7 +130,7 @@ impl Prober<'_> {
 
 impl FeatureProbing<'_, '_> {
     /// Retracts after the touches of a spot, if the arm may move.
-    pub fn finish_spot<T>(&mut self, touched: Result<T, SpotError>) -> Result<T, SpotError> {
+    pub(crate) fn finish_spot<T>(&mut self, touched: Result<T, SpotError>) -> Result<T, SpotError> {
         let ended = match touched {
             Err(SpotError::Ended(ending)) => Err(ending),
             touched => Ok(touched),
@@ -141,7 +141,7 @@ impl FeatureProbing<'_, '_> {
     /// One touch of a spot, and the centre of the ball.
     ///
     /// - `touch`: its number, from 1 on.
-    pub fn touch_spot(
+    pub(crate) fn touch_spot(
         &mut self,
         planned: &TouchPlan,
         touch: usize,

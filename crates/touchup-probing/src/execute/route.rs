@@ -22,7 +22,7 @@ pub(super) struct ToolState {
 }
 
 impl ToolState {
-    pub fn of(cell: &RobotCell, state: &ArmState) -> Self {
+    pub(crate) fn of(cell: &RobotCell, state: &ArmState) -> Self {
         Self {
             place: cell.place(&state.pose_bt),
             rotation: state.pose_bt.rotation,
@@ -70,7 +70,7 @@ impl ArmFreeSpace<'_> {
     ///
     /// # Errors
     /// As [`Limits::check_pose`]; [`LimitError::Part`].
-    pub fn check(
+    pub(crate) fn check(
         &self,
         rotation: &UnitQuaternion<f64>,
         at: &Point3<f64>,
@@ -162,7 +162,7 @@ impl ArmFreeSpace<'_> {
     ///
     /// # Errors
     /// As [`Self::check`]; [`LimitError::Jump`].
-    pub fn may_touch(
+    pub(crate) fn may_touch(
         &self,
         rotation: &UnitQuaternion<f64>,
         planned: &TouchPlan,
@@ -183,7 +183,7 @@ impl ArmFreeSpace<'_> {
     ///
     /// # Errors
     /// As [`Self::check`]; [`LimitError::Jump`].
-    pub fn may_slide(
+    pub(crate) fn may_slide(
         &self,
         rotation: &UnitQuaternion<f64>,
         slide: &Slide,
@@ -205,7 +205,7 @@ impl ArmFreeSpace<'_> {
     ///
     /// # Errors
     /// [`Ending::OutOfLimits`], [`Ending::NoClearPath`].
-    pub fn route(
+    pub(crate) fn route(
         &self,
         from: &ToolState,
         rotation: &UnitQuaternion<f64>,

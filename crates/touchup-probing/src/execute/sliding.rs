@@ -13,7 +13,7 @@ use crate::plan::{Slide, Station};
 impl FeatureProbing<'_, '_> {
     /// Slides along each path in turn, within the time limit. An impossible slide leaves a record
     /// with its reason.
-    pub fn slide_over(&mut self, slides: Vec<Slide>) -> Result<(), Ending> {
+    pub(crate) fn slide_over(&mut self, slides: Vec<Slide>) -> Result<(), Ending> {
         for slide in slides {
             let held_back = |why: String| ProbedSlide {
                 slide: slide.clone(),

@@ -20,7 +20,7 @@ impl FeatureProbing<'_, '_> {
     ///
     /// # Errors
     /// [`ProbeError::Displaced`] if a reference has moved; as any touch.
-    pub fn touch_references(&mut self) -> Result<(), Ending> {
+    pub(crate) fn touch_references(&mut self) -> Result<(), Ending> {
         let (flag, rotation) = (self.flag, self.rotation);
         self.prober.references.keep(flag, &rotation, &self.touches);
         let references = self.prober.references.kept.clone();

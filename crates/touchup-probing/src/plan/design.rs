@@ -123,7 +123,7 @@ impl Knowledge {
 
     /// Reduction by a touch of the sum over the requested numbers of (deviation / requested
     /// deviation)².
-    pub fn gain<M: SurfaceModel>(
+    pub(crate) fn gain<M: SurfaceModel>(
         &self,
         surface: &M,
         touch: &Candidate,

@@ -186,12 +186,12 @@ impl Explorer {
     }
 
     /// Places of the surface, m in O, left out because the scan has no part there.
-    pub fn left_out(&self) -> &[Point3<f64>] {
+    pub(crate) fn left_out(&self) -> &[Point3<f64>] {
         &self.context.left_out
     }
 
     /// Present standard uncertainty of the wanted number, m or rad; `None` while there is none.
-    pub fn uncertainty(&self) -> Option<f64> {
+    pub(crate) fn uncertainty(&self) -> Option<f64> {
         // also if a decision requests less
         let of_all = SearchContext {
             open: None,
@@ -246,7 +246,7 @@ impl Explorer {
 
     /// Paths of slides over the whole feature; none without a feature, or without room for the
     /// ball.
-    pub fn slides(&self) -> Vec<Slide> {
+    pub(crate) fn slides(&self) -> Vec<Slide> {
         if self.found().is_ok() {
             self.stage.slides(&self.context)
         } else {

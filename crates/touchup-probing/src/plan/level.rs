@@ -27,7 +27,7 @@ impl SearchContext {
     ///
     /// - `is_top`: no touch may lie above it.
     /// - `places`: in the frame as it was, in its plane of the surface; they stay in place.
-    pub fn level(
+    pub(crate) fn level(
         &mut self,
         observations: &mut Vec<Observation>,
         is_top: bool,

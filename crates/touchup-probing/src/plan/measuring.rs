@@ -27,7 +27,7 @@ const BEHIND: f64 = 0.3e-3;
 impl SearchContext {
     /// Candidates for which the scan has a part: all around a touch from above, behind a touched
     /// wall.
-    pub fn on_part(
+    pub(crate) fn on_part(
         &self,
         possible: impl IntoIterator<Item = CandidateTouch>,
     ) -> Vec<CandidateTouch> {
@@ -61,7 +61,7 @@ impl SurfaceRequest {
     ///
     /// - `leans`: leans that count, as far as `reach` from its middle, m; `most`: lean above which
     ///   it is another surface, rad.
-    pub fn of_plane(
+    pub(crate) fn of_plane(
         params: &PatternParams,
         leans: &[Freedom],
         reach: f64,
@@ -128,7 +128,7 @@ const DEAD: f64 = 0.2e-3;
 
 impl Measuring {
     /// Takes a touch that aimed at this surface.
-    pub fn take(&mut self, touch: &PatternStep) {
+    pub(crate) fn take(&mut self, touch: &PatternStep) {
         let aimed = self.aimed.take();
         match (touch.result, aimed) {
             (TouchResult::At { .. }, _) => self.observations.extend(touch.observation),
@@ -138,7 +138,7 @@ impl Measuring {
     }
 
     /// Refuses the last contact, which belongs to another surface.
-    pub fn refuse_last(&mut self, touch: &PatternStep) {
+    pub(crate) fn refuse_last(&mut self, touch: &PatternStep) {
         if self.observations.last() == touch.observation.as_ref()
             && self.observations.pop().is_some()
         {
@@ -152,7 +152,11 @@ impl Measuring {
     ///
     /// `None` for too few touches, for touches that do not fix a number, or for more than
     /// [`MOST_REFUSED`] of them off the surface.
-    pub fn uncertainty<M: SurfaceModel>(&self, guess: &M, wanted: &SurfaceRequest) -> Option<f64> {
+    pub(crate) fn uncertainty<M: SurfaceModel>(
+        &self,
+        guess: &M,
+        wanted: &SurfaceRequest,
+    ) -> Option<f64> {
         if self.observations.len() < wanted.least {
             return None;
         }
@@ -183,7 +187,7 @@ impl Measuring {
     ///
     /// # Errors
     /// [`ExploreError::TwoSurfaces`] if the contacts that it leaves out agree; as [`fit`].
-    pub fn fitted<M: SurfaceModel>(
+    pub(crate) fn fitted<M: SurfaceModel>(
         &self,
         guess: &M,
         params: &FitParams,
@@ -229,7 +233,7 @@ impl Measuring {
     }
 
     /// Touch with the largest gain for the requested numbers, and its gain.
-    pub fn best<M: SurfaceModel>(
+    pub(crate) fn best<M: SurfaceModel>(
         &self,
         surface: &M,
         wanted: &SurfaceRequest,
@@ -253,7 +257,7 @@ impl Measuring {
     }
 
     /// Plan of the touch with the largest gain.
-    pub fn next<M: SurfaceModel>(
+    pub(crate) fn next<M: SurfaceModel>(
         &mut self,
         surface: &M,
         wanted: &SurfaceRequest,
@@ -264,7 +268,7 @@ impl Measuring {
     }
 
     /// Plans a touch of this surface.
-    pub fn aim(&mut self, possible: &CandidateTouch) -> TouchPlan {
+    pub(crate) fn aim(&mut self, possible: &CandidateTouch) -> TouchPlan {
         self.aimed = Some(possible.point);
         possible.planned
     }

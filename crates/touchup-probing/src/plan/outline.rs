@@ -10,7 +10,7 @@ use touchup_geometry::numeric::turned_to;
 ///
 /// Only the scan within reach of touches below the flag counts: not the table under a part.
 #[derive(Clone, Debug)]
-pub struct Outline {
+pub(crate) struct Outline {
     /// maps O to the frame of the flag
     pose_fo: Isometry3<f64>,
     /// low corner of the first cell, m
@@ -31,7 +31,12 @@ const AROUND: usize = 12;
 
 impl Outline {
     /// - `scan`: in O; `flag`, `normal`: in O; `deep`: reach of touches below the flag, m.
-    pub fn new(scan: &TriMesh, flag: &Point3<f64>, normal: &Unit<Vector3<f64>>, deep: f64) -> Self {
+    pub(crate) fn new(
+        scan: &TriMesh,
+        flag: &Point3<f64>,
+        normal: &Unit<Vector3<f64>>,
+        deep: f64,
+    ) -> Self {
         let pose_fo = Isometry3::from_parts(flag.coords.into(), turned_to(normal)).inverse();
         let triangles = || {
             scan.faces()
@@ -77,7 +82,7 @@ impl Outline {
     }
 
     /// Whether the disc of a radius (m) about a place of O is all over or under the part.
-    pub fn is_part(&self, place: &Point3<f64>, radius: f64) -> bool {
+    pub(crate) fn is_part(&self, place: &Point3<f64>, radius: f64) -> bool {
         let place = (self.pose_fo * place).xy();
         let turn = |at: usize| at as f64 / AROUND as f64 * std::f64::consts::TAU;
         let around =

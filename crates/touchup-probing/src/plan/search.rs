@@ -43,7 +43,7 @@ const HIGH: f64 = 0.6;
 impl SearchContext {
     /// Depth of the deepest touch of a wall below the surface, for a centre of the ball on the
     /// floor of its opening, m.
-    pub fn above_floor(&self, depth: f64, centre: &Point3<f64>) -> f64 {
+    pub(crate) fn above_floor(&self, depth: f64, centre: &Point3<f64>) -> f64 {
         depth
             .min(self.height - centre.z - OFF_FLOOR)
             .max(BELOW_RIM * self.params.ball_radius)
@@ -55,7 +55,7 @@ impl SearchContext {
     ///
     /// # Errors
     /// [`ExploreError::TooLow`].
-    pub fn above_ground(
+    pub(crate) fn above_ground(
         &self,
         kind: &'static str,
         ground_z: f64,
@@ -104,7 +104,7 @@ impl OpeningSearch {
     ///
     /// # Errors
     /// [`ExploreError::NotFound`] after all places.
-    pub fn next(&mut self, context: &mut SearchContext) -> Result<TouchPlan, ExploreError> {
+    pub(crate) fn next(&mut self, context: &mut SearchContext) -> Result<TouchPlan, ExploreError> {
         let PatternParams {
             ball_radius,
             clearance,
@@ -142,7 +142,7 @@ impl OpeningSearch {
     }
 
     /// Takes a touch; returns its place if the ball fell in.
-    pub fn take(
+    pub(crate) fn take(
         &mut self,
         context: &mut SearchContext,
         touch: &PatternStep,
@@ -173,12 +173,12 @@ impl OpeningSearch {
 
     /// Marks a place at which the ball slid in over a rim and cannot go down again: the search goes
     /// on beside it.
-    pub fn slid_in(&mut self, place: Point3<f64>, context: &SearchContext) {
+    pub(crate) fn slid_in(&mut self, place: Point3<f64>, context: &SearchContext) {
         self.tried.push((place, 2.0 * context.params.ball_radius));
     }
 
     /// Why there is no feature yet.
-    pub fn not_done(context: &SearchContext, is_open: bool) -> ExploreError {
+    pub(crate) fn not_done(context: &SearchContext, is_open: bool) -> ExploreError {
         match is_open {
             true => Self::not_found(&context.params),
             false => ExploreError::NotDone {
@@ -188,7 +188,11 @@ impl OpeningSearch {
     }
 
     /// Keeps of the touches from above only those on the surface, not on the rim.
-    pub fn forget(&mut self, is_on_rim: impl Fn(&Point3<f64>) -> bool, context: &SearchContext) {
+    pub(crate) fn forget(
+        &mut self,
+        is_on_rim: impl Fn(&Point3<f64>) -> bool,
+        context: &SearchContext,
+    ) {
         self.top.retain(|o| !is_on_rim(&context.in_f(&o.point)));
     }
 }

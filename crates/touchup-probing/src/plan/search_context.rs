@@ -205,30 +205,30 @@ pub(super) struct SearchContext {
 const DOWN: f64 = 0.99;
 
 impl SearchContext {
-    pub fn is_down(&self, planned: &TouchPlan) -> bool {
+    pub(crate) fn is_down(&self, planned: &TouchPlan) -> bool {
         planned.direction.dot(&self.out()) < -DOWN
     }
 
     /// Whether a touch would go down beside the part.
-    pub fn is_beside(&self, planned: &TouchPlan) -> bool {
+    pub(crate) fn is_beside(&self, planned: &TouchPlan) -> bool {
         self.is_down(planned) && !self.outline.is_part(&planned.from, 0.0)
     }
 
     /// Records a place of F without a touch.
-    pub fn leave_out(&mut self, place: &Point3<f64>) {
+    pub(crate) fn leave_out(&mut self, place: &Point3<f64>) {
         self.left_out
             .push(self.pose_of * Point3::new(place.x, place.y, self.height));
     }
 
     /// Whether the whole ball is over the part at a place of F.
-    pub fn is_over_part(&self, place: &Point3<f64>) -> bool {
+    pub(crate) fn is_over_part(&self, place: &Point3<f64>) -> bool {
         self.outline
             .is_part(&(self.pose_of * place), self.params.ball_radius)
     }
 
     /// One of several places of F for touches from above; for a place beside the part, the one of
     /// `others` over the part and farthest from all touched places.
-    pub fn over_part(
+    pub(crate) fn over_part(
         &mut self,
         at: usize,
         wanted: &[Point3<f64>],
@@ -265,7 +265,7 @@ impl SearchContext {
     /// part.
     ///
     /// - `first`: number of their steps from x to the first; `away`: from the middle, m.
-    pub fn around(
+    pub(crate) fn around(
         &mut self,
         at: usize,
         first: f64,
@@ -279,21 +279,21 @@ impl SearchContext {
         self.over_part(at, &wanted, &others)
     }
 
-    pub fn out(&self) -> Vector3<f64> {
+    pub(crate) fn out(&self) -> Vector3<f64> {
         self.pose_of.rotation * Vector3::z()
     }
 
-    pub fn in_f(&self, point: &Point3<f64>) -> Point3<f64> {
+    pub(crate) fn in_f(&self, point: &Point3<f64>) -> Point3<f64> {
         self.pose_of.inverse_transform_point(point)
     }
 
     /// Height of the centre of a ball clear of the surface.
-    pub fn clear(&self) -> f64 {
+    pub(crate) fn clear(&self) -> f64 {
         self.height + self.params.ball_radius + self.params.clearance
     }
 
     /// Touch down at a place of F.
-    pub fn down(&self, place: &Point3<f64>, search: f64) -> TouchPlan {
+    pub(crate) fn down(&self, place: &Point3<f64>, search: f64) -> TouchPlan {
         let from = self.pose_of * Point3::new(place.x, place.y, self.clear());
         TouchPlan {
             entry: from,
@@ -305,7 +305,7 @@ impl SearchContext {
     }
 
     /// Touch from a place of F, at a depth below the surface, along a direction of F.
-    pub fn sideways(
+    pub(crate) fn sideways(
         &self,
         place: &Point3<f64>,
         depth: f64,
@@ -324,18 +324,18 @@ impl SearchContext {
     }
 
     /// Touch down at the flag, then at the places of a ring around it.
-    pub fn ring(&self, at: usize, radius: f64, search: f64) -> TouchPlan {
+    pub(crate) fn ring(&self, at: usize, radius: f64, search: f64) -> TouchPlan {
         let far = if at == 0 { 0.0 } else { radius };
         self.down(&Point3::from(toward(at as f64 / RING as f64) * far), search)
     }
 
     /// Height of the place that a ball touches below its centre.
-    pub fn below(&self, centre: &Point3<f64>) -> f64 {
+    pub(crate) fn below(&self, centre: &Point3<f64>) -> f64 {
         centre.z - self.params.ball_radius
     }
 
     /// Place of a contact from above, in O.
-    pub fn end(&self, contact: &Observation) -> End {
+    pub(crate) fn end(&self, contact: &Observation) -> End {
         End {
             point: contact.point - self.out() * contact.offset,
             sigma: contact.sigma,

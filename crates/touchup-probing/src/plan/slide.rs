@@ -109,7 +109,7 @@ impl RimStation<'_> {
     }
 
     /// Along the wall at several depths, then across the rim again and again.
-    pub fn slides(&self, context: &SearchContext) -> Vec<Slide> {
+    pub(crate) fn slides(&self, context: &SearchContext) -> Vec<Slide> {
         let ball = context.params.ball_radius;
         let [highest, deepest] = self.depths;
         if self.room < LEAST_ROOM * ball || deepest < highest {

@@ -200,7 +200,7 @@ fn about(of: [usize; 2], first: &Landmark, second: &Landmark) -> Option<Base> {
 
 impl Base {
     /// The motion from this base onto `other`.
-    pub fn onto(&self, other: &Self) -> Isometry3<f64> {
+    pub(crate) fn onto(&self, other: &Self) -> Isometry3<f64> {
         let turn = Rotation3::from_matrix_unchecked(other.axes * self.axes.transpose());
         let mut turn = UnitQuaternion::from_rotation_matrix(&turn);
         turn.renormalize();
@@ -225,13 +225,13 @@ impl Base {
 pub(super) struct SortedSets(Vec<Base>);
 
 impl SortedSets {
-    pub fn new(mut bases: Vec<Base>) -> Self {
+    pub(crate) fn new(mut bases: Vec<Base>) -> Self {
         bases.sort_by(|a, b| a.class.cmp(&b.class).then(a.length.total_cmp(&b.length)));
         Self(bases)
     }
 
     /// Sets that may equal `base`, by lengths and angles.
-    pub fn like<'a>(&'a self, base: &'a Base, play: f64) -> impl Iterator<Item = &'a Base> {
+    pub(crate) fn like<'a>(&'a self, base: &'a Base, play: f64) -> impl Iterator<Item = &'a Base> {
         let is_before =
             |other: &Base| (other.class, other.length) < (base.class, base.length - play);
         let from = self.0.partition_point(is_before);

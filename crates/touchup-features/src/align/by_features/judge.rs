@@ -53,7 +53,7 @@ pub(super) struct JudgedMotion {
 
 impl JudgedMotion {
     /// Matched features: of the source, of the target.
-    pub fn explained(&self) -> impl Iterator<Item = [usize; 2]> + '_ {
+    pub(crate) fn explained(&self) -> impl Iterator<Item = [usize; 2]> + '_ {
         let is_there = |(own, partner): (usize, &Option<(usize, f64)>)| {
             partner
                 .filter(|(_, misfit)| *misfit <= 1.0)
@@ -63,7 +63,7 @@ impl JudgedMotion {
     }
 
     /// Share of the agreeing points.
-    pub fn agreeing(&self) -> Option<f64> {
+    pub(crate) fn agreeing(&self) -> Option<f64> {
         let count = self
             .distances
             .iter()
@@ -73,7 +73,7 @@ impl JudgedMotion {
     }
 
     /// Weight of the explained features.
-    pub fn weight(&self, matching: &Matching) -> f64 {
+    pub(crate) fn weight(&self, matching: &Matching) -> f64 {
         self.explained()
             .map(|[own, _]| matching.source[own].weight())
             .sum()
@@ -99,7 +99,11 @@ pub(super) struct Judge<'a> {
 }
 
 impl<'a> Judge<'a> {
-    pub fn new(matching: Matching, surfaces: Option<&'a Surfaces<'a>>, in_mirror: bool) -> Self {
+    pub(crate) fn new(
+        matching: Matching,
+        surfaces: Option<&'a Surfaces<'a>>,
+        in_mirror: bool,
+    ) -> Self {
         let points = surfaces.map_or(&[][..], |surfaces| surfaces.points);
         let flip = |v: Vector3<f64>| {
             if in_mirror {
@@ -121,7 +125,7 @@ impl<'a> Judge<'a> {
     }
 
     /// Refines each motion and judges it; the best first, no two alike.
-    pub fn all(&self, motions: &[Isometry3<f64>]) -> Vec<JudgedMotion> {
+    pub(crate) fn all(&self, motions: &[Isometry3<f64>]) -> Vec<JudgedMotion> {
         let step = self.points.len().div_ceil(MOST_POINTS).max(1);
         let points: Vec<Point3<f64>> = self.points.iter().step_by(step).map(|p| p.point).collect();
         let refined = motions.iter().map(|coarse| {
@@ -193,7 +197,7 @@ impl<'a> Judge<'a> {
     }
 
     /// The motions that no other rules out; all of them if each has one that rules it out.
-    pub fn left_over(&self, judged: Vec<JudgedMotion>) -> Vec<JudgedMotion> {
+    pub(crate) fn left_over(&self, judged: Vec<JudgedMotion>) -> Vec<JudgedMotion> {
         let is_ruled_out = |b: &JudgedMotion| judged.iter().any(|a| self.rules_out(a, b));
         let left: Vec<JudgedMotion> = judged
             .iter()
@@ -204,7 +208,7 @@ impl<'a> Judge<'a> {
     }
 
     /// Whether all evidence decides for `a` against `b`.
-    pub fn is_better_throughout(&self, a: &JudgedMotion, b: &JudgedMotion) -> bool {
+    pub(crate) fn is_better_throughout(&self, a: &JudgedMotion, b: &JudgedMotion) -> bool {
         self.by_features(a, b) && (self.surfaces.is_none() || self.by_surface(a, b))
     }
 
@@ -253,7 +257,7 @@ impl<'a> Judge<'a> {
     }
 
     /// Whether `turn` keeps the surface on the target; facets of a round part count as round.
-    pub fn stays(&self, best: &JudgedMotion, turn: &Isometry3<f64>) -> bool {
+    pub(crate) fn stays(&self, best: &JudgedMotion, turn: &Isometry3<f64>) -> bool {
         let turned = self.judged(turn * best.motion, None);
         let is_lost = |(own, turned): &(&f64, &f64)| own.is_finite() && !turned.is_finite();
         let lost = best
@@ -266,7 +270,7 @@ impl<'a> Judge<'a> {
     }
 
     /// The motions of the result, refined with all points.
-    pub fn settled(&self, judged: Vec<JudgedMotion>) -> Vec<Alternative> {
+    pub(crate) fn settled(&self, judged: Vec<JudgedMotion>) -> Vec<Alternative> {
         let points: Vec<Point3<f64>> = self.points.iter().map(|p| p.point).collect();
         let mut alternatives: Vec<Alternative> = Vec::new();
         for judged in judged {

@@ -84,7 +84,7 @@ impl Landmark {
     }
 
     /// Whether it has a position and an outward direction: two such landmarks determine a motion.
-    pub fn is_located(&self) -> bool {
+    pub(crate) fn is_located(&self) -> bool {
         let has_place = match self.kind {
             FeatureKind::Hole | FeatureKind::Slot | FeatureKind::Pocket | FeatureKind::Boss => true,
             // the place of a step is on its shoulder, that of another is somewhere on its axis
@@ -95,7 +95,7 @@ impl Landmark {
     }
 
     /// Its kind; pockets count as slots, as their border is a matter of taste.
-    pub fn class(&self) -> FeatureKind {
+    pub(crate) fn class(&self) -> FeatureKind {
         if self.kind == FeatureKind::Pocket {
             FeatureKind::Slot
         } else {
@@ -104,7 +104,7 @@ impl Landmark {
     }
 
     /// Itself, and the other end of a through feature.
-    pub fn ends(&self) -> impl Iterator<Item = Self> + '_ {
+    pub(crate) fn ends(&self) -> impl Iterator<Item = Self> + '_ {
         let other = self
             .axis
             .filter(|_| self.is_through && self.is_located())
@@ -117,7 +117,7 @@ impl Landmark {
     }
 
     /// Its weight: an opening is one thing, an edge part of many.
-    pub fn weight(&self) -> f64 {
+    pub(crate) fn weight(&self) -> f64 {
         match self.kind {
             FeatureKind::Hole | FeatureKind::Slot | FeatureKind::Pocket | FeatureKind::Boss => 1.0,
             FeatureKind::Corner => 0.5,
@@ -128,7 +128,7 @@ impl Landmark {
     }
 
     /// Whether both may be the same thing, by properties independent of their places.
-    pub fn is_like(&self, other: &Self, params: &FeaturesParams) -> bool {
+    pub(crate) fn is_like(&self, other: &Self, params: &FeaturesParams) -> bool {
         let sizes = self.size.zip(other.size).is_none_or(|([a, s], [b, t])| {
             (a - b).abs() <= params.size_tolerance * a.max(b) + SIGMAS * s.hypot(t)
         });
@@ -140,7 +140,7 @@ impl Landmark {
     }
 
     /// Largest distance between the places of one and the other, m.
-    pub fn play(&self, other: &Self, tolerance: f64) -> f64 {
+    pub(crate) fn play(&self, other: &Self, tolerance: f64) -> f64 {
         tolerance + (SIGMAS * self.sigma.hypot(other.sigma)).min(3.0 * tolerance)
     }
 
@@ -148,7 +148,7 @@ impl Landmark {
     /// differ. An edge or a through feature may be anywhere along the other.
     ///
     /// - `tolerance`: m
-    pub fn misfit(&self, motion: &Isometry3<f64>, other: &Self, tolerance: f64) -> f64 {
+    pub(crate) fn misfit(&self, motion: &Isometry3<f64>, other: &Self, tolerance: f64) -> f64 {
         let play = self.play(other, tolerance);
         let offset = motion * self.place - other.place;
         let Some((own, theirs)) = self.axis.zip(other.axis) else {
@@ -174,7 +174,7 @@ impl Landmark {
     }
 
     /// Projection onto the constrained offsets from `other`.
-    pub fn held(&self, other: &Self) -> Matrix3<f64> {
+    pub(crate) fn held(&self, other: &Self) -> Matrix3<f64> {
         match other.axis {
             Some(axis) if self.kind == FeatureKind::Plane => axis * axis.transpose(),
             Some(axis) if self.is_line() || other.is_line() => {
@@ -185,12 +185,12 @@ impl Landmark {
     }
 
     /// 1/variance of the place beside that of another, 1/m².
-    pub fn trust(&self, other: &Self, tolerance: f64) -> f64 {
+    pub(crate) fn trust(&self, other: &Self, tolerance: f64) -> f64 {
         1.0 / (self.sigma.powi(2) + other.sigma.powi(2) + (0.1 * tolerance).powi(2))
     }
 
     /// Its mirror image at x = 0.
-    pub fn mirrored(&self) -> Self {
+    pub(crate) fn mirrored(&self) -> Self {
         let flip = |v: Vector3<f64>| Vector3::new(-v.x, v.y, v.z);
         Self {
             place: flip(self.place.coords).into(),

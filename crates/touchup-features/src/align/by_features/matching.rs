@@ -25,7 +25,7 @@ const ROUNDS: usize = 4;
 
 impl Matching {
     /// - `size`: of the target, m: the unit of the tolerances
-    pub fn new(
+    pub(crate) fn new(
         source: Vec<Landmark>,
         target: Vec<Landmark>,
         params: &FeaturesParams,
@@ -53,17 +53,17 @@ impl Matching {
     }
 
     /// Whether two landmarks could be one.
-    pub fn is_like(&self, own: usize, theirs: usize) -> bool {
+    pub(crate) fn is_like(&self, own: usize, theirs: usize) -> bool {
         self.like[own].binary_search(&theirs).is_ok()
     }
 
     /// Number of comparisons for one motion.
-    pub fn cost(&self) -> usize {
+    pub(crate) fn cost(&self) -> usize {
         self.like.iter().map(Vec::len).sum::<usize>() + self.source.len()
     }
 
     /// The best partner of each feature and its misfit; at most 1 means explained.
-    pub fn partners(&self, motion: &Isometry3<f64>) -> Vec<Option<(usize, f64)>> {
+    pub(crate) fn partners(&self, motion: &Isometry3<f64>) -> Vec<Option<(usize, f64)>> {
         (0..self.source.len())
             .map(|own| self.partner(motion, own))
             .collect()
@@ -83,7 +83,7 @@ impl Matching {
     }
 
     /// Sum of the weights of the explained features, decreasing with their misfits.
-    pub fn score(&self, motion: &Isometry3<f64>) -> f64 {
+    pub(crate) fn score(&self, motion: &Isometry3<f64>) -> f64 {
         let part = |own: usize| match self.partner(motion, own) {
             Some((_, misfit)) if misfit <= 1.0 => self.source[own].weight() * (1.0 - 0.25 * misfit),
             _ => 0.0,
@@ -92,12 +92,12 @@ impl Matching {
     }
 
     /// Distance between the features moved by two motions, m.
-    pub fn apart(&self, a: &Isometry3<f64>, b: &Isometry3<f64>) -> f64 {
+    pub(crate) fn apart(&self, a: &Isometry3<f64>, b: &Isometry3<f64>) -> f64 {
         (a * self.middle - b * self.middle).norm() + self.lever * a.rotation.angle_to(&b.rotation)
     }
 
     /// Least squares over the features that a motion explains.
-    pub fn refined(&self, start: &Isometry3<f64>) -> Isometry3<f64> {
+    pub(crate) fn refined(&self, start: &Isometry3<f64>) -> Isometry3<f64> {
         let mut motion = *start;
         for _ in 0..ROUNDS {
             let Some(better) = self.step(&motion) else {

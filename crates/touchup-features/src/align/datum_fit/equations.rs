@@ -55,7 +55,7 @@ fn turn_between(from: &Vector3<f64>, to: &Vector3<f64>) -> Vector3<f64> {
 }
 
 impl Equations {
-    pub fn of(
+    pub(crate) fn of(
         pairs: &[DatumPair],
         motion: &Isometry3<f64>,
         centre: &Point3<f64>,
@@ -98,17 +98,17 @@ impl Equations {
         }
     }
 
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.rows.nrows()
     }
 
     /// Rows of a pair.
-    pub fn all(&self, pair: usize) -> Range<usize> {
+    pub(crate) fn all(&self, pair: usize) -> Range<usize> {
         self.of_pair[pair].0.clone()
     }
 
     /// Rows of the place of a pair.
-    pub fn places(&self, pair: usize) -> Range<usize> {
+    pub(crate) fn places(&self, pair: usize) -> Range<usize> {
         let (rows, places) = &self.of_pair[pair];
         rows.start..rows.start + places
     }

@@ -18,7 +18,7 @@ pub(super) struct Solution {
 
 impl Solution {
     /// Solves the equations; `None` if numbers are out of all proportion.
-    pub fn of(equations: &Equations, stages: &[Vec<usize>]) -> Option<Self> {
+    pub(crate) fn of(equations: &Equations, stages: &[Vec<usize>]) -> Option<Self> {
         let mut gain = DMatrix::<f64>::zeros(6, equations.len());
         let mut open = DMatrix::<f64>::identity(6, 6);
         for stage in stages {
@@ -50,7 +50,7 @@ impl Solution {
 
     /// # Errors
     /// [`DatumFitError::Free`]
-    pub fn check_open(&self) -> Result<(), DatumFitError> {
+    pub(crate) fn check_open(&self) -> Result<(), DatumFitError> {
         if self.open.ncols() == 0 {
             Ok(())
         } else {
@@ -59,7 +59,7 @@ impl Solution {
     }
 
     /// Step: shift, and turn as the shift at the lever, m.
-    pub fn step(&self, equations: &Equations) -> Vector6<f64> {
+    pub(crate) fn step(&self, equations: &Equations) -> Vector6<f64> {
         let step = -(&self.gain * &equations.misfits);
         Vector6::from_fn(|i, _| step[i])
     }

@@ -72,7 +72,7 @@ pub(super) struct SolvedMotion {
 
 impl SolvedMotion {
     /// - `without`: index of a pair to leave out.
-    pub fn of(pairs: &[PointPair], weights: &[f64], without: Option<usize>) -> Option<Self> {
+    pub(crate) fn of(pairs: &[PointPair], weights: &[f64], without: Option<usize>) -> Option<Self> {
         let kept = || {
             pairs
                 .iter()
@@ -118,7 +118,7 @@ impl SolvedMotion {
         })
     }
 
-    pub fn fit(&self, pairs: &[PointPair], weights: &[f64], given: Option<f64>) -> PairsFit {
+    pub(crate) fn fit(&self, pairs: &[PointPair], weights: &[f64], given: Option<f64>) -> PairsFit {
         let residuals: Vec<_> = pairs.iter().map(|p| p.to - self.motion * p.from).collect();
         let n = pairs.len() as f64;
         let rms = (residuals.iter().map(Vector3::norm_squared).sum::<f64>() / n).sqrt();

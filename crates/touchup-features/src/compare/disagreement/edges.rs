@@ -66,7 +66,7 @@ pub(super) struct SharpEdges {
 }
 
 impl SharpEdges {
-    pub fn of(scan: &TriMesh, refined: &TriMesh, is_seen: &[bool]) -> Self {
+    pub(crate) fn of(scan: &TriMesh, refined: &TriMesh, is_seen: &[bool]) -> Self {
         let (resolution, is_sharp) = (median_edge(scan), sharp_vertices(refined, is_seen));
         let sharp = (0..is_sharp.len()).filter(|&at| is_sharp[at] != [false; 2]);
         let grid = PointGrid::of(refined.positions(), sharp, ROUNDED * resolution);
@@ -78,12 +78,12 @@ impl SharpEdges {
     }
 
     /// Distance within which edges are round, m.
-    pub fn reach(&self) -> f64 {
+    pub(crate) fn reach(&self) -> f64 {
         ROUNDED * self.resolution
     }
 
     /// Width below which the scan closes over gaps, m.
-    pub fn sees_from(&self) -> f64 {
+    pub(crate) fn sees_from(&self) -> f64 {
         NARROW * self.resolution
     }
 
@@ -93,13 +93,18 @@ impl SharpEdges {
     }
 
     /// Whether the scanner may round an edge at a place.
-    pub fn is_near(&self, p: &Point3<f64>) -> bool {
+    pub(crate) fn is_near(&self, p: &Point3<f64>) -> bool {
         self.near(p).next().is_some()
     }
 
     /// Whether a place's own surface has a convex edge nearby, so that a scan may be too low there,
     /// and a concave edge, so that it may be too high.
-    pub fn may_be(&self, mesh: &TriMesh, p: &Point3<f64>, normal: &Vector3<f64>) -> [bool; 2] {
+    pub(crate) fn may_be(
+        &self,
+        mesh: &TriMesh,
+        p: &Point3<f64>,
+        normal: &Vector3<f64>,
+    ) -> [bool; 2] {
         let is_own = |&other: &usize| {
             (mesh.positions()[other] - p).dot(normal).abs() <= LEVEL * self.resolution
         };
@@ -113,7 +118,12 @@ impl SharpEdges {
     }
 
     /// Whether a place is wide enough for a scanner of this resolution.
-    pub fn is_wide(&self, shape: &IndexedMesh<'_>, p: &Point3<f64>, normal: &Vector3<f64>) -> bool {
+    pub(crate) fn is_wide(
+        &self,
+        shape: &IndexedMesh<'_>,
+        p: &Point3<f64>,
+        normal: &Vector3<f64>,
+    ) -> bool {
         let radius = self.sees_from() / 2.0;
         shape
             .tree

@@ -78,7 +78,7 @@ pub(super) struct VertexProperties {
 
 impl VertexProperties {
     /// Indices of places that the scanner sees well.
-    pub fn open(&self) -> Vec<usize> {
+    pub(crate) fn open(&self) -> Vec<usize> {
         (0..self.off.len()).filter(|&at| self.is_open[at]).collect()
     }
 }

@@ -60,7 +60,7 @@ pub(super) struct OffsetFit {
 
 impl OffsetFit {
     /// Fits the open places; `None` if they determine nothing.
-    pub fn of(places: &VertexProperties) -> Option<Self> {
+    pub(crate) fn of(places: &VertexProperties) -> Option<Self> {
         let open = places.open();
         let (centre, lever) = centroid_and_spread(open.iter().map(|&at| &places.positions[at]));
         let row = |&at: &usize| {
@@ -108,14 +108,14 @@ impl OffsetFit {
     }
 
     /// Part of touch − scan that it explains at a place, m.
-    pub fn at(&self, p: &Point3<f64>, normal: &Vector3<f64>) -> f64 {
+    pub(crate) fn at(&self, p: &Point3<f64>, normal: &Vector3<f64>) -> f64 {
         normal.dot(&(self.shift + self.turn.cross(&(p - self.centre))))
     }
 
     /// The motion, if it is significant against the noise.
     ///
     /// - `scanner`: without the motion.
-    pub fn significant(&self, scanner: &Scanner) -> Option<RigidOffset> {
+    pub(crate) fn significant(&self, scanner: &Scanner) -> Option<RigidOffset> {
         let alike = TAU * scanner.correlation.powi(2);
         let more = self.area / alike - UNKNOWNS;
         if more <= 0.0 {

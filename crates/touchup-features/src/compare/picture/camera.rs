@@ -26,7 +26,7 @@ pub(super) struct Camera {
 
 impl Camera {
     /// Views from the direction `out` with `up` upwards, as far as possible.
-    pub fn new(out: &Vector3<f64>, up: &Vector3<f64>) -> Self {
+    pub(crate) fn new(out: &Vector3<f64>, up: &Vector3<f64>) -> Self {
         let out = out.try_normalize(0.0).unwrap_or_else(Vector3::z);
         // nearly along the view `up` is useless
         let other = if out.y.abs() < 0.9 {
@@ -49,7 +49,7 @@ impl Camera {
     /// the picture.
     ///
     /// - `weight`: of each vertex slot, 0 or more.
-    pub fn towards(mesh: &TriMesh, weight: impl Fn(VertexId) -> f64) -> Self {
+    pub(crate) fn towards(mesh: &TriMesh, weight: impl Fn(VertexId) -> f64) -> Self {
         let weighted = |(face, corners): (FaceId, [VertexId; 3])| {
             mesh.double_area_normal(face) * corners.into_iter().map(&weight).sum::<f64>()
         };
@@ -92,7 +92,7 @@ impl Camera {
 
     /// Right, up and towards the viewer, m.
     #[inline]
-    pub fn project(&self, p: &Point3<f64>) -> Vector3<f64> {
+    pub(crate) fn project(&self, p: &Point3<f64>) -> Vector3<f64> {
         Vector3::new(
             self.right.dot(&p.coords),
             self.up.dot(&p.coords),
@@ -101,7 +101,10 @@ impl Camera {
     }
 
     /// The box around all vertices in the picture, m: lower left, upper right.
-    pub fn bounds<'a>(&self, meshes: impl Iterator<Item = &'a TriMesh>) -> [Vector2<f64>; 2] {
+    pub(crate) fn bounds<'a>(
+        &self,
+        meshes: impl Iterator<Item = &'a TriMesh>,
+    ) -> [Vector2<f64>; 2] {
         let empty = [f64::INFINITY, f64::NEG_INFINITY].map(Vector2::repeat);
         let flat = meshes
             .flat_map(TriMesh::positions)

@@ -35,19 +35,19 @@ pub(super) const NOTE: Font = Font {
 
 impl Font {
     /// Height of a line, pixels.
-    pub fn height(self) -> i32 {
+    pub(crate) fn height(self) -> i32 {
         self.height.val() as i32
     }
 
     /// Width of a text in one line, pixels.
-    pub fn width(self, text: &str) -> i32 {
+    pub(crate) fn width(self, text: &str) -> i32 {
         (get_raster_width(self.weight, self.height) * text.chars().count()) as i32
     }
 }
 
 impl Picture {
     /// A picture of one colour.
-    pub fn blank(size: [u32; 2], colour: Rgb) -> Self {
+    pub(crate) fn blank(size: [u32; 2], colour: Rgb) -> Self {
         Self {
             size,
             pixels: colour.repeat(size[0] as usize * size[1] as usize),
@@ -67,7 +67,7 @@ impl Picture {
     }
 
     /// Fills a box of width and height from its upper left corner.
-    pub fn fill(&mut self, [x, y]: [i32; 2], [width, height]: [i32; 2], colour: Rgb) {
+    pub(crate) fn fill(&mut self, [x, y]: [i32; 2], [width, height]: [i32; 2], colour: Rgb) {
         for row in y..y + height {
             (x..x + width).for_each(|column| self.mix(column, row, colour, 1.0));
         }

@@ -77,7 +77,7 @@ pub(super) struct PictureFrame {
 
 impl PictureFrame {
     /// Pixels to the right and downwards of a place in the plane of the view, m.
-    pub fn pixel(&self, place: &Vector2<f64>) -> [f64; 2] {
+    pub(crate) fn pixel(&self, place: &Vector2<f64>) -> [f64; 2] {
         let [width, height] = self.size.map(f64::from);
         let off = (place - self.middle) * self.scale;
         [width / 2.0 + off.x, height / 2.0 - off.y]

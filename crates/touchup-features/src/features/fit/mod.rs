@@ -37,4 +37,5 @@ pub use robust::fit;
 pub(crate) use robust::fit_mesh;
 pub use stadium::from_segment;
 pub use stadium::{Ends, Stadium};
-pub use surface::{Distance, FREEDOMS, Freedom, Steps, SurfaceModel};
+pub use surface::Distance;
+pub use surface::{FREEDOMS, Freedom, Steps, SurfaceModel};

@@ -44,7 +44,11 @@ pub(super) struct FitProblem<'a> {
 }
 
 impl<'a> FitProblem<'a> {
-    pub fn new(observations: &'a [Observation], axis: Vector3<f64>, params: &FitParams) -> Self {
+    pub(crate) fn new(
+        observations: &'a [Observation],
+        axis: Vector3<f64>,
+        params: &FitParams,
+    ) -> Self {
         let names = distinct(observations.iter().map(|o| o.group));
         let group = observations
             .iter()
@@ -62,7 +66,7 @@ impl<'a> FitProblem<'a> {
     }
 
     /// Size of a scaled step of 1 in each freedom: `size` for lengths, 1 rad for angles.
-    pub fn units<M: SurfaceModel>(&self) -> Steps {
+    pub(crate) fn units<M: SurfaceModel>(&self) -> Steps {
         let second = if M::SECOND_IS_LENGTH { self.size } else { 1.0 };
         Steps::from([
             self.size, self.size, self.size, 1.0, 1.0, 1.0, self.size, second,
@@ -70,12 +74,12 @@ impl<'a> FitProblem<'a> {
     }
 
     /// Distance less offset and shift, m.
-    pub fn residual<M: SurfaceModel>(&self, surface: &M, i: usize) -> f64 {
+    pub(crate) fn residual<M: SurfaceModel>(&self, surface: &M, i: usize) -> f64 {
         surface.distance(&self.observations[i].point) - self.observations[i].offset - self.shift[i]
     }
 
     /// All residuals in their own standard deviations.
-    pub fn normalised<M: SurfaceModel>(&self, surface: &M) -> Vec<f64> {
+    pub(crate) fn normalised<M: SurfaceModel>(&self, surface: &M) -> Vec<f64> {
         (0..self.observations.len())
             .map(|i| self.residual(surface, i) / self.observations[i].sigma)
             .collect()
@@ -83,7 +87,7 @@ impl<'a> FitProblem<'a> {
 
     /// Weights of the squares, 1/m²: the `kept` share (0 to 1) of each observation, over σ² and
     /// over the sum of the shares in its group.
-    pub fn weights(&self, kept: &[f64]) -> Vec<f64> {
+    pub(crate) fn weights(&self, kept: &[f64]) -> Vec<f64> {
         let mut in_group = vec![0.0; self.groups];
         self.group
             .iter()
@@ -96,7 +100,7 @@ impl<'a> FitProblem<'a> {
     }
 
     /// Normal equations of the residuals around a surface: a scaled step is minus their solution.
-    pub fn equations<M: SurfaceModel>(
+    pub(crate) fn equations<M: SurfaceModel>(
         &self,
         surface: &M,
         weights: &[f64],
@@ -115,7 +119,7 @@ impl<'a> FitProblem<'a> {
     /// Equations of the prior axis: seen from F it leans by −a, a its own x and y.
     ///
     /// Turning F by ω takes a from a to a + a × ω, ω as in [`SurfaceModel::derivatives`].
-    pub fn prior<M: SurfaceModel>(&self, surface: &M) -> NormalEquations<FREEDOMS> {
+    pub(crate) fn prior<M: SurfaceModel>(&self, surface: &M) -> NormalEquations<FREEDOMS> {
         let mut sum = NormalEquations::default();
         if let Some((axis, sigma)) = self.known_axis {
             let known = surface.pose_of().inverse_transform_vector(&axis);
@@ -179,7 +183,7 @@ impl<'a> FitProblem<'a> {
     }
 
     /// Takes one step that does not raise the cost, if any.
-    pub fn step<M: SurfaceModel>(&self, surface: M, weights: &[f64]) -> M {
+    pub(crate) fn step<M: SurfaceModel>(&self, surface: M, weights: &[f64]) -> M {
         self.search(
             &DampedSearch {
                 first: 1e-6,
@@ -196,7 +200,11 @@ impl<'a> FitProblem<'a> {
     ///
     /// # Errors
     /// [`FitError::NotConverged`].
-    pub fn solve<M: SurfaceModel>(&self, surface: M, weights: &[f64]) -> Result<M, FitError> {
+    pub(crate) fn solve<M: SurfaceModel>(
+        &self,
+        surface: M,
+        weights: &[f64],
+    ) -> Result<M, FitError> {
         match self.search(&SEARCH, surface, weights, SETTLED) {
             (_, SearchEnd::Unsettled) => Err(FitError::NotConverged {
                 iterations: MOST_STEPS,
@@ -206,7 +214,7 @@ impl<'a> FitProblem<'a> {
     }
 
     /// The same surface with its frame amid the kept observations, at least one.
-    pub fn described<M: SurfaceModel>(&self, surface: &M, kept: &[f64]) -> M {
+    pub(crate) fn described<M: SurfaceModel>(&self, surface: &M, kept: &[f64]) -> M {
         let is_kept = self
             .observations
             .iter()

@@ -12,13 +12,13 @@ pub(super) struct Aabb {
 }
 
 impl Aabb {
-    pub const EMPTY: Self = Self {
+    pub(crate) const EMPTY: Self = Self {
         lo: [f32::INFINITY; 3],
         hi: [f32::NEG_INFINITY; 3],
     };
 
     #[inline]
-    pub fn union(&self, other: &Self) -> Self {
+    pub(crate) fn union(&self, other: &Self) -> Self {
         Self {
             lo: std::array::from_fn(|i| lesser(self.lo[i], other.lo[i])),
             hi: std::array::from_fn(|i| greater(self.hi[i], other.hi[i])),
@@ -27,7 +27,7 @@ impl Aabb {
 
     /// Bounds of some faces.
     #[inline]
-    pub fn around(
+    pub(crate) fn around(
         mesh: &TriMesh,
         origin: &Point3<f64>,
         faces: impl Iterator<Item = FaceId>,
@@ -64,7 +64,7 @@ impl Aabb {
     /// One unit in the last place wider on each side: rounding is monotone, so all corners are
     /// inside, and the union of widened boxes is the widened union.
     #[inline]
-    pub fn rounded_outward(&self) -> Self {
+    pub(crate) fn rounded_outward(&self) -> Self {
         let unit = |x: f32| x.abs() * f32::EPSILON + f32::MIN_POSITIVE;
         Self {
             lo: self.lo.map(|x| x - unit(x)),
@@ -74,7 +74,7 @@ impl Aabb {
 
     /// At least `margin` (m) wider on each side.
     #[inline]
-    pub fn grown(&self, margin: f64) -> Self {
+    pub(crate) fn grown(&self, margin: f64) -> Self {
         let grown = |x: f32, margin: f64| (f64::from(x) + margin) as f32;
         Self {
             lo: self.lo.map(|x| grown(x, -margin)),
@@ -85,14 +85,14 @@ impl Aabb {
 
     /// Half of the surface, m²; the cost of a query grows with it.
     #[inline]
-    pub fn half_area(&self) -> f32 {
+    pub(crate) fn half_area(&self) -> f32 {
         let [x, y, z]: [f32; 3] = std::array::from_fn(|i| self.hi[i] - self.lo[i]);
         x * y + y * z + z * x
     }
 
     /// Whether this box contains all of another one.
     #[inline]
-    pub fn encloses(&self, other: &Self) -> bool {
+    pub(crate) fn encloses(&self, other: &Self) -> bool {
         (0..3).fold(true, |all, i| {
             all & (self.lo[i] <= other.lo[i]) & (self.hi[i] >= other.hi[i])
         })
@@ -100,7 +100,7 @@ impl Aabb {
 
     /// Squared distance to a point (relative to the tree's origin), in single precision; 0 inside.
     #[inline]
-    pub fn distance_squared(&self, p: &[f32; 3]) -> f32 {
+    pub(crate) fn distance_squared(&self, p: &[f32; 3]) -> f32 {
         let outside = |i: usize| greater(greater(self.lo[i] - p[i], p[i] - self.hi[i]), 0.0);
         let (x, y, z) = (outside(0), outside(1), outside(2));
         x * x + y * y + z * z
@@ -108,7 +108,7 @@ impl Aabb {
 
     /// The largest box of single precision within a box; it overlaps the same boxes of single
     /// precision.
-    pub fn within(lo: &Vector3<f64>, hi: &Vector3<f64>) -> Self {
+    pub(crate) fn within(lo: &Vector3<f64>, hi: &Vector3<f64>) -> Self {
         let up = |x: f64| {
             if f64::from(x as f32) < x {
                 (x as f32).next_up()
@@ -124,7 +124,7 @@ impl Aabb {
 
     /// Whether two boxes overlap; without branches, as the outcome is hard to predict.
     #[inline]
-    pub fn overlaps(&self, other: &Self) -> bool {
+    pub(crate) fn overlaps(&self, other: &Self) -> bool {
         (0..3).fold(true, |all, i| {
             all & (self.lo[i] <= other.hi[i]) & (self.hi[i] >= other.lo[i])
         })

@@ -77,7 +77,7 @@ pub(super) struct SearchState {
 
 impl SearchState {
     #[inline]
-    pub fn new(tree: &FaceTree, p: &Point3<f64>, reach: f64) -> Self {
+    pub(crate) fn new(tree: &FaceTree, p: &Point3<f64>, reach: f64) -> Self {
         let (q, tie, reach) = (p - tree.origin, tree.tie(), reach.max(0.0));
         let slack = tree.slack(&q) + tie;
         let q = [q.x as f32, q.y as f32, q.z as f32];
@@ -103,7 +103,7 @@ impl SearchState {
 
     /// Updates the best hit by the faces of a leaf; see [`FaceTree::search`].
     #[inline]
-    pub fn take(
+    pub(crate) fn take(
         &mut self,
         faces: &[FaceId],
         measure: impl Fn(FaceId, f64) -> Option<FaceHit>,

@@ -38,7 +38,7 @@ pub(super) struct Edges {
 
 impl Edges {
     /// Visits every edge once.
-    pub fn of(mesh: &TriMesh) -> Self {
+    pub(crate) fn of(mesh: &TriMesh) -> Self {
         let mut edges = Self {
             boundary: Vec::new(),
             duplicates: Vec::new(),
@@ -111,7 +111,7 @@ impl Edges {
     /// piece (Möbius) keeps a seam.
     ///
     /// Returns the number of faces turned over and the number of pieces.
-    pub fn orient(self, mesh: &mut TriMesh) -> (usize, usize) {
+    pub(crate) fn orient(self, mesh: &mut TriMesh) -> (usize, usize) {
         let any_against = self.pieces.any_against;
         let pieces = self.pieces.number();
         let open = open_pieces(&self.boundary, &self.crowded, &pieces);

@@ -11,7 +11,7 @@ pub(super) struct FaceSets {
 
 impl FaceSets {
     /// Each face in a set of its own.
-    pub fn new(faces: usize) -> Self {
+    pub(crate) fn new(faces: usize) -> Self {
         Self {
             parents: (0..faces as u32).map(|f| f << 1).collect(),
             any_against: false,
@@ -37,7 +37,7 @@ impl FaceSets {
     /// Joins the sets of two neighbours; `against`: one of the two is upside down. The lowest face
     /// becomes the root.
     #[inline]
-    pub fn join(&mut self, a: u32, b: u32, against: bool) {
+    pub(crate) fn join(&mut self, a: u32, b: u32, against: bool) {
         self.any_against |= against;
         // most share a parent already
         if self.parents[a as usize] != self.parents[b as usize] ^ u32::from(against) {
@@ -55,7 +55,7 @@ impl FaceSets {
     }
 
     /// Numbers the sets in the order of their lowest faces.
-    pub fn number(self) -> FaceComponents {
+    pub(crate) fn number(self) -> FaceComponents {
         let (mut pieces, mut roots) = (self.parents, Vec::new());
         for face in 0..pieces.len() {
             let up = pieces[face];
@@ -82,13 +82,13 @@ pub(super) struct FaceComponents {
 impl FaceComponents {
     /// Number of the set of a face.
     #[inline]
-    pub fn piece(&self, face: u32) -> usize {
+    pub(crate) fn piece(&self, face: u32) -> usize {
         (self.pieces[face as usize] >> 1) as usize
     }
 
     /// Whether a face lies upside down against the root of its set.
     #[inline]
-    pub fn parity(&self, face: u32) -> bool {
+    pub(crate) fn parity(&self, face: u32) -> bool {
         self.pieces[face as usize] & 1 == 1
     }
 }

@@ -75,7 +75,7 @@ pub enum ContactModel {
 impl ContactModel {
     /// # Errors
     /// [`DynamicsError::BadParameter`] for a value that is not finite, or not positive as required.
-    pub fn check(&self) -> Result<(), DynamicsError> {
+    pub(crate) fn check(&self) -> Result<(), DynamicsError> {
         let positive = |name, value| DynamicsError::check(name, value, value > 0.0);
         match *self {
             Self::Sigmoid {

@@ -5,7 +5,7 @@ use super::error::DynamicsError;
 /// Error per step, relative to the size of each component, of [`super::StepRule::DormandPrince`].
 pub(crate) const RELATIVE: f64 = 1e-11;
 /// Maximum number of steps, accepted or not; beyond it the problem is stiff: some ten milliseconds.
-pub const MAX_STEPS: usize = 20_000;
+pub(crate) const MAX_STEPS: usize = 20_000;
 /// A step may shrink to a fifth and grow fivefold.
 const CHANGE: (f64, f64) = (0.2, 5.0);
 /// Aim below the tolerance, so that most steps pass.

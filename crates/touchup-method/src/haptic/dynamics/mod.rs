@@ -34,7 +34,7 @@ pub use error::DynamicsError;
 pub use rotation::turn;
 
 /// Tolerance on |n| = 1 of the input: six digits in a file are enough.
-pub const UNIT_TOLERANCE: f64 = 1e-6;
+pub(crate) const UNIT_TOLERANCE: f64 = 1e-6;
 /// Largest error of [`StepRule::Bounded`]: of the position over the farthest travel, of the normal
 /// over 1. Larger roundings of the input decide instead.
 pub const RELATIVE_ERROR: f64 = 1e-9;

@@ -22,7 +22,7 @@ pub(super) struct UsablePoints {
 
 impl UsablePoints {
     /// Usable points of a cloud, with counts of the others.
-    pub fn of(cloud: PointCloud) -> (Self, CloudSummary) {
+    pub(crate) fn of(cloud: PointCloud) -> (Self, CloudSummary) {
         let PointCloud {
             positions,
             normals,
@@ -72,7 +72,7 @@ impl UsablePoints {
     }
 
     /// Scanner position of a point, m, if known.
-    pub fn eye(&self, at: usize) -> Option<Point3<f64>> {
+    pub(crate) fn eye(&self, at: usize) -> Option<Point3<f64>> {
         self.stations[self.station[at] as usize].eye
     }
 }

@@ -80,7 +80,7 @@ impl OrientedPoints {
     }
 
     /// The zero set of f in the cells of the points and their neighbours: vertices, m, and faces.
-    pub fn contoured(
+    pub(crate) fn contoured(
         &self,
         lattice: &Lattice,
         workers: &dyn Workers,

@@ -34,7 +34,11 @@ impl PointNeighbourhood {
     /// Neighbourhoods of all points.
     ///
     /// - `positions`: more than [`PLANE`].
-    pub fn of_all(positions: &[Point3<f64>], tree: &PointTree, workers: &dyn Workers) -> Vec<Self> {
+    pub(crate) fn of_all(
+        positions: &[Point3<f64>],
+        tree: &PointTree,
+        workers: &dyn Workers,
+    ) -> Vec<Self> {
         map_by(workers, positions.len(), |at| Self::of(at, positions, tree))
     }
 

@@ -67,7 +67,7 @@ pub(in crate::reconstruct) struct Pieces {
 impl Pieces {
     /// Cuts a face by the planes of the lattice between the cells from `lo` to `hi`; the outermost
     /// cells take the parts beyond.
-    pub fn cut(
+    pub(crate) fn cut(
         &mut self,
         mesh: &TriMesh,
         face: FaceId,
@@ -100,29 +100,29 @@ impl Pieces {
     }
 
     /// The pieces and their cells.
-    pub fn iter(&self) -> impl Iterator<Item = (LatticeNode, &[Corner])> + '_ {
+    pub(crate) fn iter(&self) -> impl Iterator<Item = (LatticeNode, &[Corner])> + '_ {
         self.spans
             .iter()
             .map(|span| (span.cell, self.corners_of(span)))
     }
 
     /// Position of a point, m, in O.
-    pub fn position(&self, point: u32) -> Point3<f64> {
+    pub(crate) fn position(&self, point: u32) -> Point3<f64> {
         self.points[point as usize].1
     }
 
     /// Support of a point.
-    pub fn place(&self, point: u32) -> PointSupport {
+    pub(crate) fn place(&self, point: u32) -> PointSupport {
         self.points[point as usize].0
     }
 
     /// Number of points.
-    pub fn point_count(&self) -> usize {
+    pub(crate) fn point_count(&self) -> usize {
         self.points.len()
     }
 
     /// Name of a point of a piece in `cell`.
-    pub fn key(&self, point: u32, cell: LatticeNode) -> VertexKey {
+    pub(crate) fn key(&self, point: u32, cell: LatticeNode) -> VertexKey {
         match self.place(point) {
             PointSupport::Corner(i) => VertexKey::Scan(self.vertices[i as usize]),
             PointSupport::Trace { side, axis, plane } => {

@@ -35,14 +35,14 @@ pub(in crate::reconstruct) struct CoarseBlocks(CellTable<LatticeNode, ()>);
 
 impl CoarseBlocks {
     /// Whether an owner's faces may be merged with others.
-    pub fn holds(&self, owner: &Owner) -> bool {
+    pub(crate) fn holds(&self, owner: &Owner) -> bool {
         owner
             .node()
             .is_some_and(|node| self.0.contains(&block_of(node)))
     }
 
     /// `core`, and all blocks whose faces depend on it.
-    pub fn around(&self, core: &CellBox) -> CellBox {
+    pub(crate) fn around(&self, core: &CellBox) -> CellBox {
         let mut all = *core;
         self.each_near(core, |block| {
             let lo = block.map(|x| x * BLOCK);
@@ -54,7 +54,7 @@ impl CoarseBlocks {
     }
 
     /// Restores the lattice's faces of the blocks that depend on `core`.
-    pub fn refine(&mut self, core: &CellBox) {
+    pub(crate) fn refine(&mut self, core: &CellBox) {
         let mut near = Vec::new();
         self.each_near(core, |block| near.push(block));
         for block in near {

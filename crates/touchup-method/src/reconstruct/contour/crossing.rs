@@ -35,7 +35,7 @@ impl Crossings {
     /// The crossing of an edge with ends of opposite sign: from the touched field between touched
     /// nodes, else interpolated between the ends, and in free space moved to the surface of the
     /// ball.
-    pub fn at(
+    pub(crate) fn at(
         &mut self,
         grid: &ReconstructionGrid,
         evidence: &Evidence<'_>,

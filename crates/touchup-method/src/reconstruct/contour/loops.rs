@@ -104,12 +104,12 @@ pub(in crate::reconstruct) struct Loops {
 }
 
 impl Loops {
-    pub const EMPTY: Self = Self {
+    pub(crate) const EMPTY: Self = Self {
         next: [[NONE; 2]; 12],
     };
 
     /// Adds a segment on square number `side`, given as numbers of edges in [`Square::edges`].
-    pub fn add(&mut self, side: u8, [from, to]: [u8; 2]) {
+    pub(crate) fn add(&mut self, side: u8, [from, to]: [u8; 2]) {
         let ring = ring_edges(side);
         let (from, to) = (ring[from as usize], ring[to as usize]);
         // the material is on the left of a loop seen from outside the cell: below, that is against
@@ -124,12 +124,12 @@ impl Loops {
 
     /// Adds a segment on square number `side` from edge to edge, numbered in the cell and directed
     /// as its loop.
-    pub fn link(&mut self, from: u8, to: u8, side: u8) {
+    pub(crate) fn link(&mut self, from: u8, to: u8, side: u8) {
         self.next[from as usize] = [to, side];
     }
 
     /// The steps of the loop from edge `first`: edge by edge, with the square that follows each.
-    pub fn walk(&self, first: u8) -> impl Iterator<Item = (u8, u8)> + '_ {
+    pub(crate) fn walk(&self, first: u8) -> impl Iterator<Item = (u8, u8)> + '_ {
         let mut at = first;
         let mut left = 12;
         std::iter::from_fn(move || {
@@ -145,7 +145,7 @@ impl Loops {
     }
 
     /// The number of the loop at each edge, [`NONE`] without a loop, and the number of loops.
-    pub fn numbers(&self) -> ([u8; 12], u8) {
+    pub(crate) fn numbers(&self) -> ([u8; 12], u8) {
         let (mut numbers, mut count) = ([NONE; 12], 0);
         for edge in 0..12 {
             if self.next[edge as usize][0] != NONE && numbers[edge as usize] == NONE {

@@ -23,7 +23,7 @@ pub(in crate::reconstruct) type WeightedPlane = (Point3<f64>, Vector3<f64>, f64)
 
 impl Planes {
     /// Weighted mean of the points.
-    pub fn mean(&self) -> Point3<f64> {
+    pub(crate) fn mean(&self) -> Point3<f64> {
         let total: f64 = self.0.iter().map(|(.., weight)| weight).sum();
         Point3::from(
             self.0
@@ -37,7 +37,7 @@ impl Planes {
     /// The point nearest to `start` that minimises Σ w (n·(x − p))² within the box from `lo` to
     /// `hi`, which holds `start`; no part of the loop is back-facing from there. Ignores directions
     /// in which the sum of the w n nᵀ has an eigenvalue below `threshold` times their sum.
-    pub fn solve(
+    pub(crate) fn solve(
         &self,
         start: &Point3<f64>,
         threshold: f64,

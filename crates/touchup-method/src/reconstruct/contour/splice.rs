@@ -79,12 +79,12 @@ impl Splice {
     }
 
     /// Faces added by the last call.
-    pub fn added(&self) -> &[FaceId] {
+    pub(crate) fn added(&self) -> &[FaceId] {
         &self.added
     }
 
     /// Placed vertices of the last delta, in its order.
-    pub fn placed(&self) -> &[VertexId] {
+    pub(crate) fn placed(&self) -> &[VertexId] {
         &self.placed
     }
 

@@ -37,7 +37,7 @@ pub(crate) struct Agreement {
 }
 
 impl Agreement {
-    pub fn agreeing<'a>(
+    pub(crate) fn agreeing<'a>(
         &'a self,
         contacts: &'a ContactMap,
     ) -> impl Iterator<Item = (&'a MeanContact, f64)> {
@@ -49,7 +49,11 @@ impl Agreement {
     }
 
     /// Displacement u(x), m, and its share s.
-    pub fn displacement(&self, contacts: &ContactMap, x: &Point3<f64>) -> (Vector3<f64>, f64) {
+    pub(crate) fn displacement(
+        &self,
+        contacts: &ContactMap,
+        x: &Point3<f64>,
+    ) -> (Vector3<f64>, f64) {
         let of = |index: u32| self.mismatch[index as usize];
         let mut nearest = f64::INFINITY;
         contacts.near(x, RESTS * self.radius, |distance_squared, index| {
@@ -81,7 +85,7 @@ impl Agreement {
     ///
     /// - `normal`: of the touched surface there.
     /// - returns: `None` if the scan is not the touched surface.
-    pub fn around(
+    pub(crate) fn around(
         &self,
         contacts: &ContactMap,
         foot: &Point3<f64>,
@@ -113,7 +117,7 @@ impl Agreement {
 
     /// Whether the moved scan may be the surface at a `part` of the touched one, `deeper` (m) than
     /// it.
-    pub fn is_alike(&self, deeper: f64, part: TouchedPart) -> bool {
+    pub(crate) fn is_alike(&self, deeper: f64, part: TouchedPart) -> bool {
         let [highest, deepest] = match part {
             TouchedPart::Edge => [EDGE_OFF; 2],
             TouchedPart::Border => [LARGEST_OFF, EDGE_OFF],

@@ -33,7 +33,7 @@ pub struct MeanContact {
 
 /// Outcome of adding a contact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ContactVerdict {
+pub(crate) enum ContactVerdict {
     /// part of the mean of its place
     Taken,
     /// in contradiction to its place, rejected
@@ -167,7 +167,7 @@ impl ContactMap {
     }
 
     /// Adds a contact to the mean of its cell, unless it contradicts its place.
-    pub fn add(&mut self, contact: &SurfaceContact) -> ContactVerdict {
+    pub(crate) fn add(&mut self, contact: &SurfaceContact) -> ContactVerdict {
         self.outliers.contacts += 1;
         let bin = self.bin_of(contact);
         let own = self.find(&bin);
@@ -461,7 +461,7 @@ impl ContactMap {
     }
 
     /// Number of undoable strokes.
-    pub fn strokes(&self) -> usize {
+    pub(crate) fn strokes(&self) -> usize {
         self.history.len()
     }
 
@@ -569,7 +569,7 @@ impl ContactMap {
     /// Calls `each` with the squared distance (m²) and the number of every mean nearer to `x` than
     /// `reach` (m), at most that of the map.
     #[inline]
-    pub fn near(&self, x: &Point3<f64>, reach: f64, mut each: impl FnMut(f64, u32)) {
+    pub(crate) fn near(&self, x: &Point3<f64>, reach: f64, mut each: impl FnMut(f64, u32)) {
         self.near_known(x, reach, |distance_squared, index| {
             if self.means[index as usize].weight > 0.0 {
                 each(distance_squared, index);

@@ -32,7 +32,7 @@ pub(in crate::reconstruct) struct IndependentPasses {
 
 impl IndependentPasses {
     /// Counts a contact of this weight; returns whether it is independent of earlier ones.
-    pub fn note(&mut self, stamp_ns: i64, weight: f64, window_ns: i64) -> bool {
+    pub(crate) fn note(&mut self, stamp_ns: i64, weight: f64, window_ns: i64) -> bool {
         let newest = self.slots[(self.count.wrapping_sub(1)) as usize % REMEMBERED];
         let is_new = self.count == 0 || stamp_ns.saturating_sub(newest.began_ns) > window_ns;
         if is_new {
@@ -46,7 +46,7 @@ impl IndependentPasses {
         is_new
     }
 
-    pub fn iter(&self) -> impl Iterator<Item = &Pass> + '_ {
+    pub(crate) fn iter(&self) -> impl Iterator<Item = &Pass> + '_ {
         self.slots.iter().take(self.count as usize)
     }
 }
@@ -71,7 +71,7 @@ pub(in crate::reconstruct) struct ContactStatistics {
 }
 
 impl ContactStatistics {
-    pub fn add(&mut self, contact: &SurfaceContact) {
+    pub(crate) fn add(&mut self, contact: &SurfaceContact) {
         let SurfaceContact {
             point,
             normal,
@@ -89,12 +89,12 @@ impl ContactStatistics {
         self.place += weight * sigma.place;
     }
 
-    pub fn point(&self) -> Point3<f64> {
+    pub(crate) fn point(&self) -> Point3<f64> {
         Point3::from(self.point / self.weight)
     }
 
     /// Uncertainty of the place from one pass.
-    pub fn sigma(&self) -> ContactSigma {
+    pub(crate) fn sigma(&self) -> ContactSigma {
         let [noise, reach, tilt] =
             [self.noise, self.reach, self.tilt].map(|sum| (sum / self.weight).sqrt());
         let [calibration, place] = [self.calibration, self.place].map(|sum| sum / self.weight);
@@ -112,7 +112,7 @@ impl ContactStatistics {
     /// Both share the calibration error, which cancels.
     ///
     /// - `roughness`: distance of the surface itself from a chord, m.
-    pub fn innovation(&self, contact: &SurfaceContact, roughness: f64) -> (f64, f64) {
+    pub(crate) fn innovation(&self, contact: &SurfaceContact, roughness: f64) -> (f64, f64) {
         let normal = direction(&self.normal).unwrap_or(contact.normal);
         let arm = contact.point - self.point();
         let own = self.sigma();

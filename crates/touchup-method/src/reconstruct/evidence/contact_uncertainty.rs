@@ -46,7 +46,7 @@ parameters! {
 
 impl ContactSigma {
     /// Systematic part, which does not average out, m.
-    pub fn systematic(&self) -> f64 {
+    pub(crate) fn systematic(&self) -> f64 {
         self.calibration.hypot(self.place)
     }
 }

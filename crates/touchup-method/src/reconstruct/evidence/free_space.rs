@@ -87,12 +87,12 @@ impl FreeSpace {
     }
 
     /// Whether the tip is a ball.
-    pub fn is_of_ball(&self) -> bool {
+    pub(crate) fn is_of_ball(&self) -> bool {
         self.body.is_none()
     }
 
     /// Adds a place of the tip.
-    pub fn add_place(&mut self, place: &TipPlace) {
+    pub(crate) fn add_place(&mut self, place: &TipPlace) {
         let centre = &place.centre;
         let is_new = self.centres.add(voxel_of(centre, self.reach), *centre);
         match &mut self.body {
@@ -107,7 +107,7 @@ impl FreeSpace {
 
     /// Forgets places of the tip with its middle nearer to `p` than `distance` (m, up to the
     /// reach); for a tip that is no ball, with its surface as near as that of a ball of its scale.
-    pub fn forget(&mut self, p: &Point3<f64>, distance: f64) {
+    pub(crate) fn forget(&mut self, p: &Point3<f64>, distance: f64) {
         let Self {
             reach,
             centres,
@@ -128,12 +128,12 @@ impl FreeSpace {
     }
 
     /// Middles of balls that cover the places added or removed since the last call.
-    pub fn take_changed(&mut self) -> Vec<Point3<f64>> {
+    pub(crate) fn take_changed(&mut self) -> Vec<Point3<f64>> {
         std::mem::take(&mut self.changed)
     }
 
     /// Begins an undoable stroke.
-    pub fn begin_stroke(&mut self) {
+    pub(crate) fn begin_stroke(&mut self) {
         self.centres.begin_stroke();
         self.body
             .iter_mut()
@@ -141,7 +141,7 @@ impl FreeSpace {
     }
 
     /// Number of undoable strokes.
-    pub fn strokes(&self) -> usize {
+    pub(crate) fn strokes(&self) -> usize {
         self.body
             .as_ref()
             .map_or(usize::MAX, |body| body.places.strokes())
@@ -149,7 +149,7 @@ impl FreeSpace {
     }
 
     /// Undoes the last stroke, or redoes the last undone one; returns whether there was one.
-    pub fn exchange(&mut self, direction: Direction) -> bool {
+    pub(crate) fn exchange(&mut self, direction: Direction) -> bool {
         self.changed.clear();
         if let Some(body) = &mut self.body {
             body.places.exchange(direction);
@@ -158,17 +158,17 @@ impl FreeSpace {
     }
 
     /// Centres of the tip in memory.
-    pub fn centres(&self) -> impl Iterator<Item = &Point3<f64>> + '_ {
+    pub(crate) fn centres(&self) -> impl Iterator<Item = &Point3<f64>> + '_ {
         self.centres.iter()
     }
 
     /// Radius of the balls of [`Self::cover`], m; `radius` for a ball tip.
-    pub fn cover_radius(&self, radius: f64) -> f64 {
+    pub(crate) fn cover_radius(&self, radius: f64) -> f64 {
         self.body.as_ref().map_or(radius, |body| body.tip.cover().1)
     }
 
     /// Calls `each` with the middles of balls that together cover the swept volume, m.
-    pub fn cover(&self, mut each: impl FnMut(&Point3<f64>)) {
+    pub(crate) fn cover(&self, mut each: impl FnMut(&Point3<f64>)) {
         match &self.body {
             None => self.centres().for_each(each),
             Some(body) => body
@@ -180,7 +180,12 @@ impl FreeSpace {
 
     /// Whether the path of the ball ended at `centre`, going in `direction` (unit): within `width`
     /// (m) all of it is behind.
-    pub fn is_end(&self, centre: &Point3<f64>, direction: &Vector3<f64>, width: f64) -> bool {
+    pub(crate) fn is_end(
+        &self,
+        centre: &Point3<f64>,
+        direction: &Vector3<f64>,
+        width: f64,
+    ) -> bool {
         let (mut sum, mut count) = (Vector3::zeros(), 0.0f64);
         for other in self
             .around(centre)
@@ -198,7 +203,7 @@ impl FreeSpace {
     ///
     /// For a tip that is no ball, the signed distance from its body plus its scale: like a ball of
     /// that radius.
-    pub fn nearest(&self, x: &Point3<f64>) -> Option<(f64, Point3<f64>)> {
+    pub(crate) fn nearest(&self, x: &Point3<f64>) -> Option<(f64, Point3<f64>)> {
         if let Some(body) = &self.body {
             return body.nearest(x);
         }

@@ -56,7 +56,7 @@ pub(in crate::reconstruct) struct KeptDetail {
 impl KeptDetail {
     /// Finds agreement, and moves the scan; `None` unless the scan is finer than the tip and agrees
     /// somewhere.
-    pub fn of(evidence: &Evidence<'_>) -> Option<Self> {
+    pub(crate) fn of(evidence: &Evidence<'_>) -> Option<Self> {
         let (scan, tree, radius) = (evidence.scan, evidence.tree, evidence.params.radius);
         if !evidence.free_space.is_of_ball() || scan.mean_edge() >= FINE * radius {
             return None;
@@ -108,7 +108,7 @@ impl KeptDetail {
     }
 
     /// Support of a patch vertex on the scan; `None` for any other.
-    pub fn support(&self, key: &VertexKey) -> Option<Support> {
+    pub(crate) fn support(&self, key: &VertexKey) -> Option<Support> {
         let of = |vertex: &VertexId| {
             let at = self
                 .moved

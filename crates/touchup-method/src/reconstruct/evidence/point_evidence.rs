@@ -66,7 +66,7 @@ impl EvidenceParams {
 
 /// The evidence for a value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Source {
+pub(crate) enum Source {
     /// the scan, without contradiction
     Scan,
     /// touches
@@ -111,7 +111,7 @@ pub(in crate::reconstruct) struct NodeState {
 impl NodeState {
     /// Touched, with this value of the field, m.
     #[cfg(test)]
-    pub fn touched(value: f64) -> Self {
+    pub(crate) fn touched(value: f64) -> Self {
         Self {
             value,
             source: Source::Touch,
@@ -127,12 +127,12 @@ impl NodeState {
     }
 
     /// Whether nothing is known here, so the value needs a fill.
-    pub fn is_open_question(&self) -> bool {
+    pub(crate) fn is_open_question(&self) -> bool {
         matches!(self.source, Source::Nothing | Source::Far | Source::Rim)
     }
 
     /// Whether the skin differs from the scan here.
-    pub fn is_changed(&self) -> bool {
+    pub(crate) fn is_changed(&self) -> bool {
         match self.source {
             Source::Touch | Source::Both | Source::Nothing => true,
             Source::Far | Source::Rim => self.is_turned(),
@@ -141,12 +141,12 @@ impl NodeState {
     }
 
     /// Whether the node is on the other side of the skin than of the scan.
-    pub fn is_turned(&self) -> bool {
+    pub(crate) fn is_turned(&self) -> bool {
         (self.value < 0.0) != (self.scan < 0.0)
     }
 
     /// Whether the surface differs from `other` by more than `slack` (m).
-    pub fn differs(&self, other: &Self, slack: f64) -> bool {
+    pub(crate) fn differs(&self, other: &Self, slack: f64) -> bool {
         self.source != other.source
             || (self.value < 0.0) != (other.value < 0.0)
             || (self.value - other.value).abs() > slack
@@ -261,7 +261,7 @@ impl Evidence<'_> {
     }
 
     /// Distance of the scan at `x` (m, in O); `None` without a face.
-    pub fn scan_at(&self, x: &Point3<f64>) -> Option<ScanDistance> {
+    pub(crate) fn scan_at(&self, x: &Point3<f64>) -> Option<ScanDistance> {
         ScanDistance::at(self.scan, self.tree, x)
     }
 
@@ -269,7 +269,7 @@ impl Evidence<'_> {
     /// σₜ²) of the nearest one; `None` without contacts in reach.
     ///
     /// - `scan`: distance of the scan there, if known.
-    pub fn touched(
+    pub(crate) fn touched(
         &self,
         x: &Point3<f64>,
         scan: Option<&ScanDistance>,

@@ -58,7 +58,7 @@ impl ProbedLog {
     }
 
     /// All touches, in order of time.
-    pub fn points(&self) -> &[ProbedPoint] {
+    pub(crate) fn points(&self) -> &[ProbedPoint] {
         &self.points
     }
 

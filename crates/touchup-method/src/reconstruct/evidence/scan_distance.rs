@@ -19,7 +19,7 @@ pub(crate) struct ScanDistance {
 
 impl ScanDistance {
     /// Signed distance and foot of `scan` at `x` (m, in O); `None` without a face.
-    pub fn at(scan: &TriMesh, tree: &FaceTree, x: &Point3<f64>) -> Option<Self> {
+    pub(crate) fn at(scan: &TriMesh, tree: &FaceTree, x: &Point3<f64>) -> Option<Self> {
         let hit = tree.closest(scan, x, f64::INFINITY)?;
         let normal = pseudo_normal(scan, &hit);
         let is_behind = (x - hit.point).dot(&normal) < 0.0;

@@ -44,7 +44,7 @@ pub(in crate::reconstruct) struct StrokeLog {
 
 impl StrokeLog {
     /// Records the touch state of the next sample.
-    pub fn note(&mut self, stamp_ns: i64, state: TouchState) {
+    pub(crate) fn note(&mut self, stamp_ns: i64, state: TouchState) {
         if state == TouchState::Free {
             self.touched_down_ns = None;
         } else {
@@ -53,7 +53,7 @@ impl StrokeLog {
     }
 
     /// Records a contact, the first of a stroke or a further one of the last stroke.
-    pub fn note_contact(&mut self, stamp_ns: i64, is_first: bool) {
+    pub(crate) fn note_contact(&mut self, stamp_ns: i64, is_first: bool) {
         if is_first {
             let down_ns = self.touched_down_ns.unwrap_or(stamp_ns);
             // after an undo during a touch, without a free sample in between, the stroke goes on
@@ -69,7 +69,7 @@ impl StrokeLog {
     }
 
     /// Records an undo of the last stroke, or a redo of the last undone one.
-    pub fn exchange(&mut self, direction: Direction) {
+    pub(crate) fn exchange(&mut self, direction: Direction) {
         let (from, to) = match direction {
             Direction::Undo => (&mut self.done, &mut self.undone),
             Direction::Redo => (&mut self.undone, &mut self.done),
@@ -78,12 +78,12 @@ impl StrokeLog {
     }
 
     /// Number of strokes that count.
-    pub fn count(&self) -> usize {
+    pub(crate) fn count(&self) -> usize {
         self.done.len()
     }
 
     /// The samples of a stroke that counts, by its number in order of time.
-    pub fn span(&self, number: usize) -> Option<StrokeSpan> {
+    pub(crate) fn span(&self, number: usize) -> Option<StrokeSpan> {
         let at = *self.done.get(number)?;
         let until_ns = self.begun_ns.get(at + 1).copied().unwrap_or(i64::MAX);
         Some(StrokeSpan {

@@ -52,7 +52,7 @@ pub(in crate::reconstruct) struct TouchHistory {
 }
 
 impl TouchHistory {
-    pub fn keep(&mut self, touch: &TipTouch) {
+    pub(crate) fn keep(&mut self, touch: &TipTouch) {
         self.note_until(touch.stamp_ns);
         self.stroke_log.note(touch.stamp_ns, touch.state);
         let place = TipPlace {
@@ -105,7 +105,7 @@ impl TouchHistory {
     }
 
     /// Extends the time up to which touches are known, ns; never backwards.
-    pub fn note_until(&mut self, stamp_ns: i64) {
+    pub(crate) fn note_until(&mut self, stamp_ns: i64) {
         self.until_ns = self.until_ns.max(stamp_ns);
     }
 
@@ -116,12 +116,12 @@ impl TouchHistory {
     }
 
     /// Number of undoable strokes.
-    pub fn strokes(&self) -> usize {
+    pub(crate) fn strokes(&self) -> usize {
         self.contacts.strokes().min(self.free_space.strokes())
     }
 
     /// Undoes the last stroke, or redoes the last undone one; returns whether there was one.
-    pub fn exchange(&mut self, direction: Direction) -> bool {
+    pub(crate) fn exchange(&mut self, direction: Direction) -> bool {
         self.last_contact_ns = None;
         let is_possible = direction == Direction::Redo || self.strokes() > 0;
         let has_changed =
@@ -135,7 +135,7 @@ impl TouchHistory {
 
     /// Decides near new evidence which contacts count and which belong to an edge; returns the
     /// places.
-    pub fn update(&mut self, scan: &TriMesh, tree: &FaceTree) -> GridChanges {
+    pub(crate) fn update(&mut self, scan: &TriMesh, tree: &FaceTree) -> GridChanges {
         let Self {
             contacts,
             free_space,

@@ -40,7 +40,7 @@ impl<T: VoxelElement> VoxelSet<T> {
     }
 
     /// Adds an element to a cube, unless its key is present; returns whether it did.
-    pub fn add(&mut self, bin: LatticeNode, thing: T) -> bool {
+    pub(crate) fn add(&mut self, bin: LatticeNode, thing: T) -> bool {
         if std::mem::replace(self.is_kept.get_or_default(thing.key(self.cell)), true) {
             return false;
         }
@@ -50,7 +50,7 @@ impl<T: VoxelElement> VoxelSet<T> {
     }
 
     /// Removes elements that fail `stays` from a cube, and passes them to `each`.
-    pub fn retain(
+    pub(crate) fn retain(
         &mut self,
         bin: LatticeNode,
         stays: impl Fn(&T) -> bool,
@@ -75,12 +75,12 @@ impl<T: VoxelElement> VoxelSet<T> {
 
     /// The elements of a cube.
     #[inline]
-    pub fn get(&self, bin: &LatticeNode) -> &[T] {
+    pub(crate) fn get(&self, bin: &LatticeNode) -> &[T] {
         self.bins.get(bin).map_or(&[], Vec::as_slice)
     }
 
     /// All elements, cube by cube.
-    pub fn iter(&self) -> impl Iterator<Item = &T> + '_ {
+    pub(crate) fn iter(&self) -> impl Iterator<Item = &T> + '_ {
         self.bins.iter().flat_map(|(_, things)| things)
     }
 
@@ -89,17 +89,17 @@ impl<T: VoxelElement> VoxelSet<T> {
     }
 
     /// Begins an undoable stroke.
-    pub fn begin_stroke(&mut self) {
+    pub(crate) fn begin_stroke(&mut self) {
         self.history.begin();
     }
 
     /// Number of undoable strokes.
-    pub fn strokes(&self) -> usize {
+    pub(crate) fn strokes(&self) -> usize {
         self.history.len()
     }
 
     /// Undoes the last stroke, or redoes the last undone one; returns whether there was one.
-    pub fn exchange(&mut self, direction: Direction) -> bool {
+    pub(crate) fn exchange(&mut self, direction: Direction) -> bool {
         let mut history = std::mem::replace(&mut self.history, History::new(MOST_KEPT));
         let has_changed = history.exchange(direction, |bin, past| self.swap(bin, past));
         self.history = history;

@@ -24,11 +24,11 @@ pub(in crate::reconstruct) struct GridChanges {
 }
 
 impl GridChanges {
-    pub fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.means.is_empty() && self.centres.is_empty()
     }
 
-    pub fn extend(&mut self, more: &Self) {
+    pub(crate) fn extend(&mut self, more: &Self) {
         self.means.extend_from_slice(&more.means);
         self.centres.extend_from_slice(&more.centres);
     }
@@ -92,7 +92,7 @@ impl ReconstructionGrid {
     ///
     /// - `changes`: applied up to the radius at which they count most.
     /// - `late`: earlier changes, applied up to the radius at which they count at all.
-    pub fn renew(
+    pub(crate) fn renew(
         &mut self,
         evidence: &Evidence<'_>,
         changes: &GridChanges,
@@ -142,7 +142,7 @@ impl ReconstructionGrid {
     }
 
     /// Evaluates further unknown nodes in and around `cells`: a filled surface goes on there.
-    pub fn look_further(
+    pub(crate) fn look_further(
         &mut self,
         evidence: &Evidence<'_>,
         cells: &LatticeRegion,
@@ -160,7 +160,12 @@ impl ReconstructionGrid {
     }
 
     /// Evaluates an unknown node; returns whether it is new.
-    pub fn add(&mut self, evidence: &Evidence<'_>, node: LatticeNode, is_further: bool) -> bool {
+    pub(crate) fn add(
+        &mut self,
+        evidence: &Evidence<'_>,
+        node: LatticeNode,
+        is_further: bool,
+    ) -> bool {
         if self.nodes.contains(&node) {
             return false;
         }
@@ -180,7 +185,7 @@ impl ReconstructionGrid {
     }
 
     /// Whether a cell has an unevaluated corner.
-    pub fn is_beyond(&self, cell: LatticeNode) -> bool {
+    pub(crate) fn is_beyond(&self, cell: LatticeNode) -> bool {
         (0..8).any(|corner| !self.nodes.contains(&node_at(cell, corner)))
     }
 
@@ -344,7 +349,7 @@ impl ReconstructionGrid {
     }
 
     /// Whether the skin in a cell differs from the scan.
-    pub fn is_in_region(&self, cell: LatticeNode) -> bool {
+    pub(crate) fn is_in_region(&self, cell: LatticeNode) -> bool {
         let corners = || (0..8).filter_map(|corner| self.nodes.get(&node_at(cell, corner)));
         let is_on_rim = corners().any(|state| state.source == Source::Rim);
         let is_other = if is_on_rim {
@@ -356,7 +361,7 @@ impl ReconstructionGrid {
     }
 
     /// Whether the field is known at all corners of a cell that need not stay open.
-    pub fn can_take(&self, cell: LatticeNode) -> bool {
+    pub(crate) fn can_take(&self, cell: LatticeNode) -> bool {
         let is_known = |node: LatticeNode| {
             self.nodes
                 .get(&node)
@@ -366,7 +371,7 @@ impl ReconstructionGrid {
     }
 
     /// Values at the corners of the cells in a box.
-    pub fn values_in(&self, cells: &CellBox) -> NodeValues {
+    pub(crate) fn values_in(&self, cells: &CellBox) -> NodeValues {
         let mut values = NodeValues::default();
         cells.widened(0, 1).each_in(&self.nodes, |node, state| {
             if state.source != Source::Beyond {

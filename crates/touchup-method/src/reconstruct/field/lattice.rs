@@ -101,7 +101,7 @@ pub struct Lattice {
 impl Lattice {
     /// Coordinate of plane number `index` across `axis`, m.
     #[inline]
-    pub fn coordinate(&self, axis: usize, index: i32) -> f64 {
+    pub(crate) fn coordinate(&self, axis: usize, index: i32) -> f64 {
         self.origin[axis] + self.pitch * f64::from(index)
     }
 
@@ -191,39 +191,39 @@ impl Default for CellBox {
 
 impl CellBox {
     /// No cell.
-    pub const EMPTY: Self = Self {
+    pub(crate) const EMPTY: Self = Self {
         lo: [i32::MAX; 3],
         hi: [i32::MIN; 3],
     };
     /// Every cell.
-    pub const ALL: Self = Self {
+    pub(crate) const ALL: Self = Self {
         lo: [i32::MIN; 3],
         hi: [i32::MAX; 3],
     };
 
-    pub fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         (0..3).any(|i| self.lo[i] > self.hi[i])
     }
 
     #[inline]
-    pub fn contains(&self, cell: &LatticeNode) -> bool {
+    pub(crate) fn contains(&self, cell: &LatticeNode) -> bool {
         (0..3).all(|i| self.lo[i] <= cell[i] && cell[i] <= self.hi[i])
     }
 
     #[inline]
-    pub fn take(&mut self, cell: &LatticeNode) {
+    pub(crate) fn take(&mut self, cell: &LatticeNode) {
         self.lo = std::array::from_fn(|i| self.lo[i].min(cell[i]));
         self.hi = std::array::from_fn(|i| self.hi[i].max(cell[i]));
     }
 
     /// Adds the cells from `below` cells below a cell to `above` cells above it, on each axis.
-    pub fn take_around(&mut self, cell: &LatticeNode, below: i32, above: i32) {
+    pub(crate) fn take_around(&mut self, cell: &LatticeNode, below: i32, above: i32) {
         self.take(&cell.map(|x| x.saturating_sub(below)));
         self.take(&cell.map(|x| x.saturating_add(above)));
     }
 
     /// Intersection of two boxes.
-    pub fn meet(&self, other: &Self) -> Self {
+    pub(crate) fn meet(&self, other: &Self) -> Self {
         let lo = std::array::from_fn(|i| self.lo[i].max(other.lo[i]));
         Self {
             lo,
@@ -232,7 +232,7 @@ impl CellBox {
     }
 
     /// Wider by `below` cells below and `above` cells above, on each axis.
-    pub fn widened(&self, below: i32, above: i32) -> Self {
+    pub(crate) fn widened(&self, below: i32, above: i32) -> Self {
         Self {
             lo: self.lo.map(|x| x.saturating_sub(below)),
             hi: self.hi.map(|x| x.saturating_add(above)),
@@ -240,14 +240,14 @@ impl CellBox {
     }
 
     /// Number of cells; ∞ beyond the range of a float.
-    pub fn volume(&self) -> f64 {
+    pub(crate) fn volume(&self) -> f64 {
         (0..3)
             .map(|i| (f64::from(self.hi[i]) - f64::from(self.lo[i]) + 1.0).max(0.0))
             .product()
     }
 
     /// The cells, x slowest.
-    pub fn iter(&self) -> impl Iterator<Item = LatticeNode> + use<> {
+    pub(crate) fn iter(&self) -> impl Iterator<Item = LatticeNode> + use<> {
         let Self { lo, hi } = *self;
         (lo[0]..=hi[0]).flat_map(move |x| {
             (lo[1]..=hi[1]).flat_map(move |y| (lo[2]..=hi[2]).map(move |z| [x, y, z]))
@@ -256,7 +256,7 @@ impl CellBox {
 
     /// Calls `each` with the cells, x slowest; faster than [`Self::iter`].
     #[inline]
-    pub fn each(&self, mut each: impl FnMut(LatticeNode)) {
+    pub(crate) fn each(&self, mut each: impl FnMut(LatticeNode)) {
         for x in self.lo[0]..=self.hi[0] {
             for y in self.lo[1]..=self.hi[1] {
                 for z in self.lo[2]..=self.hi[2] {
@@ -269,7 +269,7 @@ impl CellBox {
     /// Calls `each` with the keys of a table that lie in the box, by whichever loop is shorter; in
     /// no particular order.
     #[inline]
-    pub fn each_in<V>(
+    pub(crate) fn each_in<V>(
         &self,
         table: &CellTable<LatticeNode, V>,
         mut each: impl FnMut(LatticeNode, &V),
@@ -327,7 +327,11 @@ impl Numbers {
 
     /// The number of `node` in the source table.
     #[inline]
-    pub fn of<V>(&self, table: &CellTable<LatticeNode, V>, node: &LatticeNode) -> Option<u32> {
+    pub(crate) fn of<V>(
+        &self,
+        table: &CellTable<LatticeNode, V>,
+        node: &LatticeNode,
+    ) -> Option<u32> {
         if !self.cells.contains(node) {
             return table.index_of(node);
         }
@@ -349,13 +353,13 @@ pub struct Edge {
 impl Edge {
     /// The four cells around it, counter-clockwise seen against `axis`.
     #[inline]
-    pub fn cells(&self) -> [LatticeNode; 4] {
+    pub(crate) fn cells(&self) -> [LatticeNode; 4] {
         ring(self.node, self.axis, -1)
     }
 
     /// The four squares that end at it: number i is between cells i and i + 1 of [`Self::cells`].
     #[inline]
-    pub fn squares(&self) -> [Square; 4] {
+    pub(crate) fn squares(&self) -> [Square; 4] {
         ring_sides(self.node, self.axis, -1).map(|(node, axis)| Square { node, axis })
     }
 
@@ -385,19 +389,19 @@ pub struct Square {
 impl Square {
     /// Its corners, counter-clockwise seen against `axis`.
     #[inline]
-    pub fn corners(&self) -> [LatticeNode; 4] {
+    pub(crate) fn corners(&self) -> [LatticeNode; 4] {
         ring(self.node, self.axis, 1)
     }
 
     /// Its edges: number i joins corners i and i + 1 of [`Self::corners`].
     #[inline]
-    pub fn edges(&self) -> [Edge; 4] {
+    pub(crate) fn edges(&self) -> [Edge; 4] {
         ring_sides(self.node, self.axis, 1).map(|(node, axis)| Edge { node, axis })
     }
 
     /// The cell below it and the one above, along `axis`.
     #[inline]
-    pub fn cells(&self) -> [LatticeNode; 2] {
+    pub(crate) fn cells(&self) -> [LatticeNode; 2] {
         [stepped(self.node, self.axis as usize, -1), self.node]
     }
 }

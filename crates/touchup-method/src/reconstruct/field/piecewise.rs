@@ -46,7 +46,7 @@ impl FieldParams {
 
 /// The field of the touches at a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FieldValue {
+pub(crate) struct FieldValue {
     /// signed distance from the surface, m; positive outside the part
     pub value: f64,
     /// unit gradient
@@ -65,7 +65,7 @@ pub struct FieldValue {
 
 impl FieldValue {
     /// Distance from the nearest contact along the surface, m.
-    pub fn lateral(&self) -> f64 {
+    pub(crate) fn lateral(&self) -> f64 {
         (self.nearest * self.nearest - self.value * self.value)
             .max(0.0)
             .sqrt()
@@ -117,7 +117,7 @@ pub(in crate::reconstruct) struct PassShare {
 
 /// Buffers of an evaluation, reused by the next.
 #[derive(Clone, Debug, Default)]
-pub struct FieldScratch {
+pub(crate) struct FieldScratch {
     /// the point, m
     pub(in crate::reconstruct) at: Point3<f64>,
     pub(in crate::reconstruct) near: Vec<Member>,
@@ -163,7 +163,7 @@ const UNDER: f64 = 0.13;
 
 impl FieldParams {
     /// The field at `x` (m, in O); `None` without a contact in reach.
-    pub fn at(
+    pub(crate) fn at(
         &self,
         store: &ContactMap,
         x: &Point3<f64>,

@@ -16,7 +16,7 @@ use crate::reconstruct::field::piecewise::{
 
 /// Uncertainty of the fit, by cause; standard deviations, m.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct FitSigma {
+pub(crate) struct FitSigma {
     /// noise of the contacts
     pub noise: f64,
     /// directions of their normals, at their distance
@@ -36,7 +36,7 @@ pub struct FitSigma {
 
 impl FitSigma {
     /// All causes together, m.
-    pub fn total(&self) -> f64 {
+    pub(crate) fn total(&self) -> f64 {
         let Self {
             noise,
             tilt,
@@ -88,7 +88,7 @@ impl FieldParams {
     ///
     /// - `window_ns`: passes within this time share their noise, the nearer the more.
     #[expect(clippy::too_many_lines)]
-    pub fn sigma_of(
+    pub(crate) fn sigma_of(
         &self,
         found: &FieldValue,
         store: &ContactMap,

@@ -39,7 +39,7 @@ pub struct PatchVertex {
 
 impl PatchDelta {
     /// Whether there are no changes.
-    pub fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.vertices.is_empty() && self.owners.is_empty()
     }
 }
@@ -85,7 +85,7 @@ struct Draft {
 
 impl PublishedPatch {
     /// Blocks with merged faces.
-    pub fn coarse(&self) -> &CoarseBlocks {
+    pub(crate) fn coarse(&self) -> &CoarseBlocks {
         &self.coarse
     }
 
@@ -100,7 +100,7 @@ impl PublishedPatch {
     /// As [`Self::take`], for a renewal of everything.
     ///
     /// - `coarse`: blocks of its merged faces.
-    pub fn take_all(
+    pub(crate) fn take_all(
         &mut self,
         mut renewed: RenewedFaces,
         coarse: CoarseBlocks,
@@ -117,7 +117,12 @@ impl PublishedPatch {
     /// Adopts a renewal; returns the differences from before.
     ///
     /// - `remesh`: source of the renewal.
-    pub fn take(&mut self, renewed: &RenewedFaces, remesh: &Remesh, scan: &TriMesh) -> PatchDelta {
+    pub(crate) fn take(
+        &mut self,
+        renewed: &RenewedFaces,
+        remesh: &Remesh,
+        scan: &TriMesh,
+    ) -> PatchDelta {
         let mut draft = Draft::default();
         let core = self.coarse.around(&renewed.core);
         self.coarse.refine(&renewed.core);

@@ -20,7 +20,7 @@ pub(in crate::reconstruct) enum Direction {
 ///
 /// Undo and redo both swap kept and current values.
 #[derive(Clone, Debug)]
-pub struct History<K, V> {
+pub(crate) struct History<K, V> {
     done: VecDeque<Vec<(K, V)>>,
     undone: Vec<Vec<(K, V)>>,
     /// the keys of the current stroke
@@ -43,7 +43,7 @@ impl<K: Key, V> History<K, V> {
     }
 
     /// Begins a stroke, which ends the redo of undone ones.
-    pub fn begin(&mut self) {
+    pub(crate) fn begin(&mut self) {
         self.noted.clear();
         self.kept -= self
             .undone
@@ -56,7 +56,7 @@ impl<K: Key, V> History<K, V> {
 
     /// Keeps the value of `key` before its first change in this stroke. Before the first stroke
     /// nothing is kept; a stroke beyond the limit cannot be undone, nor can earlier ones.
-    pub fn note(&mut self, key: K, before: impl FnOnce() -> V) {
+    pub(crate) fn note(&mut self, key: K, before: impl FnOnce() -> V) {
         let Some(stroke) = self.done.back_mut() else {
             return;
         };
@@ -79,12 +79,12 @@ impl<K: Key, V> History<K, V> {
     }
 
     /// Number of undoable strokes.
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.done.len()
     }
 
     /// Whether there is no undoable stroke.
-    pub fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.done.is_empty()
     }
 
@@ -102,7 +102,7 @@ impl<K: Key, V> History<K, V> {
 
     /// Undoes the last stroke, the last change first: `swap` exchanges kept and current values.
     /// Returns whether there was one.
-    pub fn undo(&mut self, mut swap: impl FnMut(K, &mut V)) -> bool {
+    pub(crate) fn undo(&mut self, mut swap: impl FnMut(K, &mut V)) -> bool {
         let Some(mut stroke) = self.done.pop_back() else {
             return false;
         };
@@ -116,7 +116,7 @@ impl<K: Key, V> History<K, V> {
     }
 
     /// Redoes the last undone stroke. Returns whether there was one.
-    pub fn redo(&mut self, mut swap: impl FnMut(K, &mut V)) -> bool {
+    pub(crate) fn redo(&mut self, mut swap: impl FnMut(K, &mut V)) -> bool {
         let Some(mut stroke) = self.undone.pop() else {
             return false;
         };

@@ -158,7 +158,7 @@ impl PatcherParams {
 
     /// # Errors
     /// [`SettingError`] naming the first setting outside its range.
-    pub fn check(&self) -> Result<(), SettingError> {
+    pub(crate) fn check(&self) -> Result<(), SettingError> {
         let radius = self.evidence.radius;
         let is_tip = radius >= SMALLEST_TIP;
         SettingError::check(

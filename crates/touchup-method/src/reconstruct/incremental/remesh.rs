@@ -59,7 +59,7 @@ impl Remesh {
     /// Updates everything by the changes of `evidence`: as [`ReconstructionGrid::renew`].
     ///
     /// - `coarse`: blocks with merged faces; each is remade as a whole.
-    pub fn renew(
+    pub(crate) fn renew(
         &mut self,
         evidence: &Evidence<'_>,
         changes: &GridChanges,
@@ -88,7 +88,7 @@ impl Remesh {
 
     /// Updates the field with changes of `evidence` up to the radius at which they count at all;
     /// the faces follow with [`Self::renew`].
-    pub fn renew_far(&mut self, evidence: &Evidence<'_>, late: &GridChanges) {
+    pub(crate) fn renew_far(&mut self, evidence: &Evidence<'_>, late: &GridChanges) {
         let changed = self.grid.renew(evidence, &GridChanges::default(), late);
         let (mut core, mut left) = self.take_pending();
         self.take_up(&changed, &mut core, &mut left);
@@ -104,7 +104,7 @@ impl Remesh {
 
     /// Support of a vertex: touched if most of the corners of its cell are near the touched
     /// surface; for a vertex on the scan, the scan.
-    pub fn support(&self, key: &VertexKey) -> Support {
+    pub(crate) fn support(&self, key: &VertexKey) -> Support {
         let is_of_touch = |state: &NodeState| state.source == Source::Touch && !state.is_corner;
         let is_touched = |node: &LatticeNode| self.grid.nodes.get(node).is_some_and(is_of_touch);
         let touched = match *key {

@@ -351,7 +351,7 @@ impl Default for CourseClock {
 
 impl CourseClock {
     /// Takes the next sample, later than the previous one.
-    pub fn push(&mut self, sample: &ContactSample) {
+    pub(crate) fn push(&mut self, sample: &ContactSample) {
         let (tip, is_in_contact) = (&sample.tip, sample.is_in_contact());
         let is_next =
             |last: &CourseSample| tip.stamp_ns.saturating_sub(last.stamp_ns) <= LONGEST_GAP_NS;
@@ -468,7 +468,7 @@ impl CourseClock {
     }
 
     /// The delay; `None` if neither sliding nor lifting determines it, or the two differ.
-    pub fn offset(&self) -> Option<ClockOffset> {
+    pub(crate) fn offset(&self) -> Option<ClockOffset> {
         let period = mean_period(self.held.iter().map(|x| x.stamp_ns));
         let ends = self
             .ends_ns

@@ -239,7 +239,7 @@ impl Matches {
         }
     }
 
-    pub fn pairs(&self) -> &MarkerPairs {
+    pub(crate) fn pairs(&self) -> &MarkerPairs {
         &self.pairs[..self.count]
     }
 

@@ -21,7 +21,7 @@ use super::stream::StampedMessage;
 use crate::parameters;
 
 /// Maximum number of markers of a body, and of a frame.
-pub const MOST_MARKERS: usize = 16;
+pub(crate) const MOST_MARKERS: usize = 16;
 
 /// The measured position of one marker.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -72,7 +72,7 @@ pub(super) struct BodyMotion {
 }
 
 impl BodyMotion {
-    pub fn at_rest(body: &MarkerBody, pose_ot: &Isometry3<f64>) -> Self {
+    pub(crate) fn at_rest(body: &MarkerBody, pose_ot: &Isometry3<f64>) -> Self {
         let centroid = pose_ot * body.centroid_t();
         Self {
             centroid,
@@ -83,13 +83,13 @@ impl BodyMotion {
         }
     }
 
-    pub fn pose_ot(&self, body: &MarkerBody) -> Isometry3<f64> {
+    pub(crate) fn pose_ot(&self, body: &MarkerBody) -> Isometry3<f64> {
         let p_ot = self.centroid - self.rotation * body.centroid_t().coords;
         Isometry3::from_parts(p_ot.coords.into(), self.rotation)
     }
 
     /// Free flight for `dt` s.
-    pub fn fly(&self, dt: f64) -> Self {
+    pub(crate) fn fly(&self, dt: f64) -> Self {
         let mut rotation = UnitQuaternion::from_scaled_axis(self.spin * dt) * self.rotation;
         rotation.renormalize();
         Self {
@@ -100,7 +100,7 @@ impl BodyMotion {
     }
 
     /// Pulls the body by the seen markers after a flight of `dt` s.
-    pub fn pull(
+    pub(crate) fn pull(
         &mut self,
         body: &MarkerBody,
         pairs: &MarkerPairs,

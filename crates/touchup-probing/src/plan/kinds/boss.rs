@@ -53,7 +53,7 @@ pub(in crate::plan) struct BossPattern {
 }
 
 impl BossPattern {
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         let wall = RoundWall {
             is_boss: true,
             ..RoundWall::default()

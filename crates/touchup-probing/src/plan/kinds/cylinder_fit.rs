@@ -44,13 +44,13 @@ pub(in crate::plan) struct RoundWall {
 
 impl RoundWall {
     /// One of the first directions.
-    pub fn first_direction(at: usize) -> Vector3<f64> {
+    pub(crate) fn first_direction(at: usize) -> Vector3<f64> {
         // a second round goes between the first
         toward((at as f64 + 0.5 * (at / FIRST) as f64) / FIRST as f64)
     }
 
     /// Error for a missing wall after these directions.
-    pub fn missing(&self, asked: usize, reach: f64) -> ExploreError {
+    pub(crate) fn missing(&self, asked: usize, reach: f64) -> ExploreError {
         let kind = if self.is_boss { "boss" } else { "hole" };
         ExploreError::NoWall {
             kind,
@@ -61,13 +61,13 @@ impl RoundWall {
     }
 
     /// Takes a touch of the wall.
-    pub fn take(&mut self, context: &SearchContext, touch: &PatternStep) {
+    pub(crate) fn take(&mut self, context: &SearchContext, touch: &PatternStep) {
         self.measuring.take(touch);
         self.recentre(context);
     }
 
     /// Moves the middle to the circle through the contacts.
-    pub fn recentre(&mut self, context: &SearchContext) {
+    pub(crate) fn recentre(&mut self, context: &SearchContext) {
         if let Some((centre, _)) = self.circle(context) {
             self.middle = centre;
         }
@@ -84,7 +84,7 @@ impl RoundWall {
     }
 
     /// Estimated radius, m.
-    pub fn radius(&self, context: &SearchContext) -> f64 {
+    pub(crate) fn radius(&self, context: &SearchContext) -> f64 {
         let ball = context.params.ball_radius;
         let centres = self.circle(context).map_or(0.0, |(_, radius)| radius);
         if self.is_boss {
@@ -146,7 +146,7 @@ impl RoundWall {
     }
 
     /// Standard uncertainty of the requested number, m or rad.
-    pub fn uncertainty(&self, context: &SearchContext) -> Option<f64> {
+    pub(crate) fn uncertainty(&self, context: &SearchContext) -> Option<f64> {
         let guess = self.guess(context);
         self.measuring
             .uncertainty(&guess, &self.wanted(context, &guess))
@@ -155,7 +155,7 @@ impl RoundWall {
     /// Touch of the wall with the largest gain.
     ///
     /// - `depths`: below the surface, m.
-    pub fn next(&mut self, context: &SearchContext, depths: [f64; 2]) -> Option<TouchPlan> {
+    pub(crate) fn next(&mut self, context: &SearchContext, depths: [f64; 2]) -> Option<TouchPlan> {
         let surface = self.guess(context);
         let ball = context.params.ball_radius;
         // in a hole from the middle, at a boss from beside it
@@ -191,7 +191,7 @@ impl RoundWall {
     }
 
     /// Cylinder through the contacts of the wall, perpendicular to a surface.
-    pub fn fitted(
+    pub(crate) fn fitted(
         &self,
         context: &SearchContext,
         top: &Fit<Plane>,
@@ -217,7 +217,7 @@ impl RoundWall {
     ///
     /// - `back`: extent of the known surface above the rim, m; `depths`: below it, m; `room`:
     ///   beside the ball at the wall, m.
-    pub fn slides(
+    pub(crate) fn slides(
         &self,
         context: &SearchContext,
         back: f64,
@@ -246,7 +246,7 @@ impl SearchContext {
     /// rad.
     ///
     /// - `lean`: of that normal as measured, likewise.
-    pub fn square(&self, lean: f64) -> f64 {
+    pub(crate) fn square(&self, lean: f64) -> f64 {
         self.params.square.hypot(lean)
     }
 }

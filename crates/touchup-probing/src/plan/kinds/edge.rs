@@ -81,7 +81,7 @@ pub(in crate::plan) struct EdgePattern {
 }
 
 impl EdgePattern {
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self {
             over: Vector3::x(),
             ground_z: f64::NEG_INFINITY,

@@ -43,7 +43,7 @@ pub(in crate::plan) struct HolePattern {
 }
 
 impl HolePattern {
-    pub fn new(params: &PatternParams) -> Self {
+    pub(crate) fn new(params: &PatternParams) -> Self {
         Self {
             depth: params.depth.max(SHALLOW * params.ball_radius),
             ..Self::default()

@@ -32,7 +32,7 @@ pub(in crate::plan) struct PlanePattern {
 const FIRST: usize = 3;
 
 impl PlanePattern {
-    pub fn new(params: &PatternParams) -> Self {
+    pub(crate) fn new(params: &PatternParams) -> Self {
         let places = hexagonal(2.0 * params.flag_radius / ACROSS, params.flag_radius);
         Self {
             measuring: Measuring::default(),

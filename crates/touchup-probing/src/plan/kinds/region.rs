@@ -26,7 +26,7 @@ const STEEP: f64 = 0.6;
 
 impl RegionPattern {
     /// Places as dense as the budget allows.
-    pub fn new(params: &PatternParams) -> Self {
+    pub(crate) fn new(params: &PatternParams) -> Self {
         let area = std::f64::consts::PI * params.flag_radius.powi(2);
         // a place of a hexagonal grid has √3/2 of its step squared
         let step = (area / params.budget.max(1) as f64 / 0.75f64.sqrt()).sqrt();

@@ -110,7 +110,7 @@ pub(in crate::plan) struct SlotPattern {
 }
 
 impl SlotPattern {
-    pub fn new(params: &PatternParams) -> Self {
+    pub(crate) fn new(params: &PatternParams) -> Self {
         Self {
             depth: params.depth.max(SHALLOW * params.ball_radius),
             ..Self::default()

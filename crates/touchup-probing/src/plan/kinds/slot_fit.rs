@@ -70,7 +70,7 @@ const HELD: f64 = 1e-9;
 
 impl SlotFit {
     /// Unit vector along the slot.
-    pub fn along(&self) -> Vector2<f64> {
+    pub(crate) fn along(&self) -> Vector2<f64> {
         Vector2::new(self.angle.cos(), self.angle.sin())
     }
 
@@ -121,7 +121,7 @@ impl SlotFit {
     }
 
     /// Least-squares fit from a first guess.
-    pub fn fitted(self, points: &[Point2<f64>]) -> Self {
+    pub(crate) fn fitted(self, points: &[Point2<f64>]) -> Self {
         self.fitted_by(&SEARCH, points)
     }
 
@@ -196,7 +196,7 @@ impl SlotFit {
     }
 
     /// Whether a point may be in a corner of straight ends, which the fit does not model.
-    pub fn is_in_corner(&self, p: &Point2<f64>) -> bool {
+    pub(crate) fn is_in_corner(&self, p: &Point2<f64>) -> bool {
         let (u, v) = (p - self.middle, self.along());
         let corner = CORNER * self.radius;
         let is_near = |place: f64, half: f64| half - place.abs() < corner;
@@ -238,7 +238,12 @@ impl SlotFit {
     /// Fit to more points; if it disagrees with them, the best of all fits at intervals.
     ///
     /// - `agrees`: residuals of a fit that agrees, m.
-    pub fn fitted_to_more(self, points: &[Point2<f64>], free: &[Point2<f64>], agrees: f64) -> Self {
+    pub(crate) fn fitted_to_more(
+        self,
+        points: &[Point2<f64>],
+        free: &[Point2<f64>],
+        agrees: f64,
+    ) -> Self {
         let near = if self.ends == Ends::Round {
             self.fitted(points)
         } else {
@@ -260,7 +265,7 @@ impl SlotFit {
     /// farther than the contacts. Ends are round unless the points say otherwise.
     ///
     /// - `agrees`: residuals of a fit that agrees with the points, m.
-    pub fn through(
+    pub(crate) fn through(
         points: &[Point2<f64>],
         free: &[Point2<f64>],
         place: &Point2<f64>,
@@ -322,7 +327,7 @@ impl SlotFit {
     }
 
     /// The same slot, with its direction along another's rather than against it.
-    pub fn along_as(self, other: &Self) -> Self {
+    pub(crate) fn along_as(self, other: &Self) -> Self {
         let turn = if self.along().dot(&other.along()) < 0.0 {
             PI
         } else {
