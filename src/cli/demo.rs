@@ -8,10 +8,7 @@ use clap::Args;
 use nalgebra::Point3;
 use serde::Serialize;
 
-use super::common::arm::RobotName;
 use super::common::found::FoundTable;
-#[cfg(any(feature = "ros", feature = "r2r"))]
-use super::common::page::{on_page, parameters_of};
 use super::common::progress::WorkProgress;
 use super::common::refinement::{RefineSummary, RefinementFiles, RefinementResult};
 use super::common::told::ToldFlags;
@@ -21,6 +18,9 @@ use super::compare::{CompareArguments, compared};
 use super::demo_robot::demo_robot;
 #[cfg(any(feature = "ros", feature = "r2r"))]
 use super::node::end_text;
+#[cfg(any(feature = "ros", feature = "r2r"))]
+use super::page::{on_page, parameters_of};
+use super::probing::arm::RobotName;
 use super::simulate::{SimulatedInput, write_simulation};
 use super::{CliError, Losses, print_result, reported, write_json};
 use touchup_features::compare::TouchedRegion;

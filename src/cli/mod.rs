@@ -18,6 +18,8 @@ mod init;
 mod inspect;
 #[cfg(any(feature = "ros", feature = "r2r"))]
 mod node;
+#[cfg(any(feature = "ros", feature = "r2r"))]
+mod page;
 mod probe;
 mod probing;
 mod recover;

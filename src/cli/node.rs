@@ -5,12 +5,12 @@ use std::sync::Arc;
 
 use clap::Args;
 
-use super::common::arm::{connect_ur, ros2_control_arm};
 use super::common::begin::BeginError;
 use super::common::path_parameter::path;
 use super::common::signals::SignalledNode;
 use super::common::told::{ToldBy, ToldNumbers};
 use super::common::web::WebFlags;
+use super::probing::arm::{connect_ur, ros2_control_arm};
 use super::{
     CliError, Losses, by_reason, counted, print_report, print_result, require, require_positive,
 };

@@ -7,9 +7,9 @@ use clap::Args;
 use nalgebra::Point3;
 use serde::Serialize;
 
-use super::common::arm::{ArmArguments, RobotName};
 use super::common::signals::StopSignals;
 use super::common::told::ToldNumbers;
+use super::probing::arm::{ArmArguments, RobotName};
 use super::probing::{Probing, ProbingOutcome, ProbingSetup, flag_of, goals_of, millimetres};
 use super::{CliError, Losses, counted, print_report, reported, require, require_positive};
 use touchup_features::conformity::DecisionParams;

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::common::arm::recovered_ur;
+use super::probing::arm::recovered_ur;
 use super::{CliError, Losses, print_report, reported};
 use touchup_probing::arm::ArmState;
 use touchup_session::scene::Scene;

@@ -6,14 +6,14 @@ use clap::Args;
 use clap::builder::{OsStringValueParser, TypedValueParser};
 
 #[cfg(any(feature = "ros", feature = "r2r"))]
-use super::common::page::{on_page, parameters_of};
-#[cfg(any(feature = "ros", feature = "r2r"))]
 use super::common::path_parameter::path;
 use super::common::recorded::RecordedFlags;
 use super::common::refinement::{RefinementFiles, RefinementResult};
 use super::common::told::{ToldFlags, ToldNumbers};
 #[cfg(any(feature = "ros", feature = "r2r"))]
 use super::common::web::WebFlags;
+#[cfg(any(feature = "ros", feature = "r2r"))]
+use super::page::{on_page, parameters_of};
 use super::{CliError, Losses, check_kept_by, check_place, print_report, require};
 use touchup_io::atomic::is_same_file;
 use touchup_io::mesh_file::{MeshFileError, MeshUnit, check_target};

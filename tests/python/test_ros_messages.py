@@ -188,7 +188,7 @@ def test_form_and_relations_mirror_the_file_of_features(message, selector, recor
 
 def test_kinds_are_those_of_the_program():
     source = (ROOT / "crates/touchup-features/src/features/feature.rs").read_text()
-    kinds = re.findall(r"^ *\w+ = \"(\w+)\",$", re.search(r"pub enum Kind \{(.*?)\n *\}", source, re.DOTALL)[1], re.MULTILINE)
+    kinds = re.findall(r"^ *\w+ = \"(\w+)\",$", re.search(r"pub enum FeatureKind \{(.*?)\n *\}", source, re.DOTALL)[1], re.MULTILINE)
     constants = re.findall(r"^uint8 KIND_(\w+)=(\d+)$", sections("msg/Feature.msg")[0], re.MULTILINE)
     assert constants == [("UNKNOWN", "0")] + [(kind.upper(), str(i + 1)) for i, kind in enumerate(kinds)]
 

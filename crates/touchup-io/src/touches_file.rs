@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use nalgebra::{Point3, Vector3};
 
 use super::file_error::{FileError, read_file, write_file};
-use super::table_rows::{RowError, TableRows};
+use crate::tables::table_rows::{RowError, TableRows};
 use touchup_method::stylus::ProbedPoint;
 
 /// The first line of a file of touches.

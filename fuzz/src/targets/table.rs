@@ -2,9 +2,9 @@
 //! of an arm.
 
 use crate::file;
-use touchup_io::pairs_file::{read_pairs, read_scan_points};
 use touchup_io::probed_touches_file::read_probed_touches;
-use touchup_io::static_poses::read_static_poses;
+use touchup_io::tables::pairs_file::{read_pairs, read_scan_points};
+use touchup_io::tables::static_poses::read_static_poses;
 use touchup_io::touches_file::{read_touches, write_touches};
 
 /// One input of this target.

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
-use super::super::common::arm::{CellArguments, Measurement, RobotName, TruePayload};
 use super::super::probing::KeptMeasurements;
+use super::super::probing::arm::{CellArguments, Measurement, RobotName, TruePayload};
 use super::super::{CliError, Losses, require};
 use super::{CalibrationTarget, RecordingFlags};
 use touchup_method::stylus::WrenchFrame;

@@ -3,7 +3,7 @@
 use clap::Args;
 
 use super::super::check::repeated;
-use super::super::common::arm::{ArmArguments, TouchesOutput};
+use super::super::probing::arm::{ArmArguments, TouchesOutput};
 use super::super::{CliError, Losses};
 use super::CalibrationTarget;
 use touchup_session::calibration::{Calibration, StiffnessFound};

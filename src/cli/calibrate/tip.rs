@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use clap::Args;
 use nalgebra::Point3;
 
-use super::super::common::arm::{CellArguments, Measurement, RobotName, TouchesOutput};
+use super::super::probing::arm::{CellArguments, Measurement, RobotName, TouchesOutput};
 use super::super::probing::{KeptMeasurements, millimetres};
 use super::super::{CliError, Losses};
 use super::{CalibrationTarget, RecordingFlags};

@@ -9,7 +9,7 @@ use std::time::SystemTime;
 use clap::Args;
 use nalgebra::Point3;
 
-use super::common::arm::{ArmArguments, Measurement, TouchesOutput};
+use super::probing::arm::{ArmArguments, Measurement, TouchesOutput};
 use super::probing::{KeptMeasurements, check_temperature, metres, millimetres};
 use super::{CliError, Losses, print_report, require, require_positive, write_json};
 use report::SphereResults;

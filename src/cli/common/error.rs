@@ -272,7 +272,7 @@ errors_of_rooms! {
     }, "";
     touchup_method::haptic::RefineError => |_| ("refinement", 3), "the scan cannot be refined: ";
     touchup_session::live::LiveError => |_| ("refinement", 3), "";
-    touchup_io::table::TableError => |_| ("calibration", 3), "";
+    touchup_io::tables::table::TableError => |_| ("calibration", 3), "";
     touchup_features::align::IcpError => |_| ("alignment", 3), "the mesh cannot be aligned with the truth: ";
     touchup_features::align::FeaturesError => |_| ("alignment", 3), "";
     touchup_features::compare::CompareError => |_| ("comparison", 3), "the two cannot be compared: ";

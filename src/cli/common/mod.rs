@@ -1,14 +1,11 @@
 //! Common parts of the verbs: input, output, errors, progress.
 
-pub mod arm;
 pub mod arm_errors;
 #[cfg(any(feature = "ros", feature = "r2r"))]
 pub mod begin;
 pub mod error;
 pub mod found;
 pub mod output;
-#[cfg(any(feature = "ros", feature = "r2r"))]
-pub mod page;
 #[cfg(any(feature = "ros", feature = "r2r"))]
 pub mod path_parameter;
 pub mod pictures;

@@ -16,7 +16,7 @@ use touchup_features::align::{
 use touchup_features::compare::{IndexedMesh, sample_surface, surface_area};
 use touchup_features::features::detect;
 use touchup_geometry::mesh::{TriMesh, VertexId};
-use touchup_io::pairs_file::read_pairs;
+use touchup_io::tables::pairs_file::read_pairs;
 use touchup_session::threads::Threads;
 
 /// Number of points of the mesh for one alignment.

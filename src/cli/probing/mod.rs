@@ -1,6 +1,7 @@
 //! Common part of `touchup probe` and `touchup demo --robot sim`: probes features while the mesh
 //! follows, and writes all results.
 
+pub(super) mod arm;
 mod files;
 mod folder;
 mod follower;

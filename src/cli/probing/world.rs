@@ -15,7 +15,7 @@ use crate::cli::{CliError, not_written, print_result};
 use touchup_features::calibrate::StaticPose;
 use touchup_geometry::mesh::{FaceHit, FaceTree, TriMesh};
 use touchup_io::probed_touches_file::{TouchLine, TouchLog};
-use touchup_io::static_poses::{StaticPoseLog, static_pose_line};
+use touchup_io::tables::static_poses::{StaticPoseLog, static_pose_line};
 use touchup_method::stylus::{Message, Sample, StampedPose, WrenchFrame};
 use touchup_probing::arm::{ArmState, Observer, StopRequest};
 use touchup_probing::execute::{ProbedTouch, Progress, StaticWorld, World};

@@ -71,7 +71,7 @@ pub const MAY_USE: &[(&str, &str)] = &[
     ("ur", "clock stylus plan arm"),
     (
         "ros",
-        "parameters clock log_lines stylus reconstruct arm io scene threads",
+        "parameters clock log_lines stylus mesh reconstruct live arm io scene threads",
     ),
     (
         "node",

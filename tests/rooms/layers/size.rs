@@ -15,7 +15,7 @@ const LONG_FUNCTIONS: Bound = Bound {
 
 /// Folders with more than [`MOST_FILES`] directly in them.
 const FLAT_FOLDERS: Bound = Bound {
-    today: 5,
+    today: 0,
     wanted: 0,
 };
 

@@ -21,13 +21,10 @@ mod tip;
 mod tip_by_plane;
 mod workspace;
 
-pub use dwell::Dwell;
-pub use dwell::{DwellFinder, DwellParams};
+pub use dwell::{Dwell, DwellFinder, DwellParams};
 pub use payload::{PayloadError, PayloadFit, PayloadParams, VectorEstimate, fit_payload};
 pub use sphere::{ReferenceSphere, SphereFit, beside_spheres};
-pub use static_segments::SampleBlock;
-pub use static_segments::{StaticPose, StaticSegmentFinder, StaticSegmentParams};
+pub use static_segments::{SampleBlock, StaticPose, StaticSegmentFinder, StaticSegmentParams};
 pub use tip::{SwingPose, TipError, TipFit, TipFitParams, fit_tip};
 pub use tip_by_plane::{PlaneTipError, PlaneTipFit, fit_tip_by_plane};
-pub use workspace::WorkspaceError;
-pub use workspace::{CheckedPlace, SphereReading, WorkspaceCheck, check_workspace};
+pub use workspace::{CheckedPlace, SphereReading, WorkspaceCheck, WorkspaceError, check_workspace};

@@ -24,24 +24,20 @@ pub use comparison::{
     CompareParams, Comparison, IndexedMesh, RegionComparison, Regions, SupportRegion, compare,
 };
 pub use deviation::{closest_places, deviations};
-pub use disagreement::ClassMap;
-pub use disagreement::RegionEvidence;
 pub use disagreement::{
-    BadTouches, Class, Disagreement, DisagreementRegion, RefinedShape, RigidOffset, Scanner,
-    VertexBasis, disagreement,
+    BadTouches, Class, ClassMap, Disagreement, DisagreementRegion, RefinedShape, RegionEvidence,
+    RigidOffset, Scanner, VertexBasis, disagreement,
 };
 pub use displacement::{
     DisplacedFrom, Displacement, displacements_by_vertex, displacements_to_surface, moved_count,
 };
 pub use extents::UnlikeExtents;
 pub use lines::DrawnMesh;
-pub use normals::Tilt;
-pub use normals::{TiltSummary, angle_between, tilts};
+pub use normals::{Tilt, TiltSummary, angle_between, tilts};
 pub use picture::{
     PartView, Picture, PictureLabel, PicturePanel, PictureParams, draw_part, draw_picture,
 };
-pub use sampling::SampledPoint;
-pub use sampling::{sample_surface, surface_area};
+pub use sampling::{SampledPoint, sample_surface, surface_area};
 pub use summary::{Histogram, Summary};
 pub use touched::TouchedRegion;
 

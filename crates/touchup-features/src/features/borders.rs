@@ -8,10 +8,10 @@ use std::collections::BTreeMap;
 
 use nalgebra::Point3;
 
-use super::facets::NONE;
 use super::fit::Plane;
-use super::primitive::Primitive;
-use super::scene::SegmentedMesh;
+use super::segmentation::facets::NONE;
+use super::segmentation::primitive::Primitive;
+use super::segmentation::scene::SegmentedMesh;
 use touchup_geometry::numeric::distinct;
 
 /// A straight edge between two planes.

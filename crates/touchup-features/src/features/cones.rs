@@ -7,11 +7,11 @@ use std::collections::BTreeSet;
 
 use nalgebra::{Point3, Vector2, Vector3};
 
-use super::facets::NONE;
 use super::fit::{Cone, SurfaceModel};
-use super::primitive::{Primitive, belongs, refined};
-use super::scene::SegmentedMesh;
-use super::segment::Segment;
+use super::segmentation::facets::NONE;
+use super::segmentation::primitive::{Primitive, belongs, refined};
+use super::segmentation::scene::SegmentedMesh;
+use super::segmentation::segment::Segment;
 use super::walls::Wall;
 use touchup_geometry::numeric::{distinct, flood, median, tangent_basis};
 

@@ -3,17 +3,17 @@
 use nalgebra::{Matrix3, Point3, Vector3};
 
 use super::borders::{StraightEdge, borders, straight_edges, without_seams};
+use super::by_contacts::contact_heads::{Counterbore, head_of};
+use super::by_contacts::contact_slots::contact_slots;
+use super::by_contacts::contact_walls::add_contact_walls;
 use super::cones::add_cones;
-use super::contact_heads::{Counterbore, head_of};
-use super::contact_slots::contact_slots;
-use super::contact_walls::add_contact_walls;
 use super::feature::{Feature, FeatureKind, FittedTo, Form, MeasuredValue, Walls};
 use super::fit::{Fit, Freedom, Plane, Stadium, SurfaceModel};
 use super::holes::{Boss, Hole, bosses, groups, holes};
 use super::measure::{FittedSurface, Measure};
 use super::observe::{NOT_ALIKE, SegmentTouches};
 use super::rims::{OpeningOutline, RoundOpening, outlines, rims};
-use super::scene::{SegmentedMesh, numbered_by_place};
+use super::segmentation::scene::{SegmentedMesh, numbered_by_place};
 use super::shafts::is_shaft;
 use super::slots::{Slot, slots};
 use super::walls::{ALL_AROUND, SAME_WALL, Wall};

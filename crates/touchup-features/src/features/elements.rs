@@ -4,9 +4,9 @@ use nalgebra::{Matrix6, Point3, SMatrix, Vector3};
 
 use super::feature::FittedTo;
 use super::fit::{Cylinder, Fit, Plane, SurfaceModel};
-use super::grow::SEEN_FACETS;
 use super::measure::{FittedSurface, Measure};
 use super::observe::NOT_ALIKE;
+use super::segmentation::grow::SEEN_FACETS;
 use touchup_geometry::form::{
     Element, FlatForm, FormPoint, RoundForm, Shape, flat_form, round_form,
 };

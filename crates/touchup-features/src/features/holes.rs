@@ -2,8 +2,8 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::rays::RayHit;
-use super::scene::SegmentedMesh;
+use super::segmentation::rays::RayHit;
+use super::segmentation::scene::SegmentedMesh;
 use super::walls::Wall;
 use touchup_geometry::mesh::{BoxQuery, FaceId};
 use touchup_geometry::numeric::{median, tangent_basis};

@@ -11,7 +11,7 @@ use super::fit::{
     fit_mesh,
 };
 use super::observe::SegmentTouches;
-use super::primitive::Primitive;
+use super::segmentation::primitive::Primitive;
 use super::slots::Slot;
 use super::walls::Wall;
 use touchup_geometry::numeric::{order_statistic, spreads, tangent_basis};

@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 
 use nalgebra::Point3;
 
-use super::facets::NONE;
 use super::fit::{Observation, SurfaceModel};
-use super::marks::NumberSet;
-use super::primitive::Primitive;
-use super::scene::SegmentedMesh;
+use super::segmentation::facets::NONE;
+use super::segmentation::marks::NumberSet;
+use super::segmentation::primitive::Primitive;
+use super::segmentation::scene::SegmentedMesh;
 use super::slots::samples;
 use touchup_geometry::mesh::{FaceId, TriMesh, VertexId};
 use touchup_geometry::numeric::{PointGrid, VoxelKey, distinct, voxel_of};

@@ -6,11 +6,11 @@ use std::f64::consts::{PI, TAU};
 
 use nalgebra::{Point3, Vector3};
 
-use super::facets::{Facets, NONE};
 use super::feature::FeatureKind;
 use super::fit::{Cylinder, Fit, FitParams, Observation, SurfaceModel, fit_mesh};
-use super::grow::{ROUNDING, SEEN_FACETS};
-use super::scene::SegmentedMesh;
+use super::segmentation::facets::{Facets, NONE};
+use super::segmentation::grow::{ROUNDING, SEEN_FACETS};
+use super::segmentation::scene::SegmentedMesh;
 use touchup_geometry::form::RoundForm;
 use touchup_geometry::mesh::{FaceId, VertexId};
 use touchup_geometry::numeric::{mean, tangent_basis};

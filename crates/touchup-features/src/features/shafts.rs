@@ -7,8 +7,8 @@ use super::borders::Borders;
 use super::feature::FittedTo;
 use super::fit::{Plane, SurfaceModel};
 use super::measure::Measure;
-use super::primitive::{FACES_ALIKE, Primitive};
-use super::segment::Segment;
+use super::segmentation::primitive::{FACES_ALIKE, Primitive};
+use super::segmentation::segment::Segment;
 use super::walls::Wall;
 use touchup_geometry::mesh::FaceId;
 
@@ -153,9 +153,9 @@ mod tests {
     use rand::{RngExt, SeedableRng};
     use rand_pcg::Pcg64;
 
-    use super::super::facets::Facets;
     use super::super::fit::Cylinder;
-    use super::super::primitive::refined;
+    use super::super::segmentation::facets::Facets;
+    use super::super::segmentation::primitive::refined;
     use super::*;
     use touchup_geometry::mesh::TriMesh;
 

@@ -5,11 +5,11 @@ use std::collections::BTreeMap;
 use nalgebra::{Point3, Vector3};
 
 use super::borders::{Borders, is_convex};
-use super::facets::NONE;
 use super::fit::{Ends, Plane, SurfaceModel};
-use super::primitive::Primitive;
-use super::rays::RayHit;
-use super::scene::SegmentedMesh;
+use super::segmentation::facets::NONE;
+use super::segmentation::primitive::Primitive;
+use super::segmentation::rays::RayHit;
+use super::segmentation::scene::SegmentedMesh;
 use super::walls::Wall;
 use touchup_geometry::numeric::{mean, without_repeats};
 

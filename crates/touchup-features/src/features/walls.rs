@@ -4,10 +4,10 @@ use std::f64::consts::{PI, TAU};
 
 use nalgebra::{Point3, Vector3};
 
-use super::facets::Facets;
 use super::fit::SurfaceModel;
-use super::primitive::Primitive;
-use super::segment::Segmentation;
+use super::segmentation::facets::Facets;
+use super::segmentation::primitive::Primitive;
+use super::segmentation::segment::Segmentation;
 use touchup_geometry::numeric::{median, tangent_basis};
 
 /// A round wall, perhaps interrupted.

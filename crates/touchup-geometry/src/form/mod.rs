@@ -18,10 +18,8 @@ pub use datum::datum_frame;
 pub use element::{Element, Shape};
 pub use flat_form::{FlatForm, flat_form};
 pub use profile::{Estimate, FormPoint};
-pub use relation::OrientationDeviation;
-pub use relation::position;
-pub use relation::{angle, coaxiality, concentricity, distance, orientation};
+pub use relation::{
+    OrientationDeviation, angle, coaxiality, concentricity, distance, orientation, position,
+};
 pub use round_form::{Deviation, RoundForm, round_form};
-pub use zone::Zone;
-pub use zone::straightness;
-pub use zone::{cylindricity, flatness, roundness};
+pub use zone::{Zone, cylindricity, flatness, roundness, straightness};

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use crate::file_error::FileError;
-use crate::table::TableError;
+use crate::tables::table::TableError;
 
 /// Why a file of nominal values is refused.
 #[derive(Debug, thiserror::Error)]

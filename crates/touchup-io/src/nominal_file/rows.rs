@@ -7,7 +7,7 @@ use super::error::NominalFileError;
 use super::record::{DatumRecord, NominalRecord};
 use crate::file_error::{FileError, write_file};
 use crate::result_table::cell_text;
-use crate::table::{Row, TableError, WantedColumns, read_table};
+use crate::tables::table::{Row, TableError, WantedColumns, read_table};
 
 /// The columns, in any order; columns without a value in any row are optional.
 const COLUMNS: [(&str, &str); 23] = [

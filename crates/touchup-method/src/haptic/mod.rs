@@ -27,8 +27,7 @@ pub use dynamics::{
     SigmoidParams, StepRule,
 };
 pub use guard::GuardParams;
-pub use params::TouchPoint;
-pub use params::{CarveParams, RefineParams, ScanParams, ScanRegion, relaxing_alpha};
+pub use params::{CarveParams, RefineParams, ScanParams, ScanRegion, TouchPoint, relaxing_alpha};
 pub use registration::{Registrar, Registration, RegistrationError, RegistrationParams};
 pub use roi::RoiSize;
 

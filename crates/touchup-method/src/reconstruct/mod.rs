@@ -21,31 +21,31 @@
 mod cloud_surface;
 mod contour;
 mod evidence;
+mod evidence_changes;
 mod field;
+mod history;
 mod incremental;
+mod lattice;
+mod support;
 mod table;
 
 pub use cloud_surface::{CloudError, CloudSummary, CloudSurface, NormalSource, surface_of_cloud};
 pub use contour::crossing::Crossing;
 pub use contour::dual_contouring::contour;
-pub use contour::patched::{OpenSquare, Patch, PatchedMesh, Support};
+pub use contour::patched::{OpenSquare, Patch, PatchedMesh};
 pub use contour::scan_clipping::Cut;
-pub use contour::splice::Splice;
-pub use evidence::contact_map::ContactMap;
-pub use evidence::contact_map::GateParams;
-pub use evidence::contact_map::MeanContact;
-pub use evidence::contact_uncertainty::ContactSigma;
-pub use evidence::contact_uncertainty::{CalibrationParams, UncertaintyParams};
+pub use evidence::contact_map::{ContactMap, GateParams, MeanContact};
+pub use evidence::contact_uncertainty::{CalibrationParams, ContactSigma, UncertaintyParams};
 pub use evidence::outliers::{Outlier, Outliers};
+pub use evidence::piecewise::FieldParams;
 pub use evidence::point_evidence::EvidenceParams;
 pub use evidence::stroke_log::StrokeSpan;
-pub use evidence::touches::SurfaceContact;
-pub use evidence::touches::{TipTouch, TouchFinder, TouchFinderParams};
-pub use field::lattice::PatchFace;
-pub use field::lattice::Square;
-pub use field::lattice::{Edge, Lattice, LatticeNode, LatticeRegion, NodeValues, Owner, VertexKey};
-pub use field::piecewise::FieldParams;
-pub use incremental::delta::PatchDelta;
-pub use incremental::delta::PatchVertex;
-pub(crate) use incremental::history::History;
+pub use evidence::touches::{SurfaceContact, TipTouch, TouchFinder, TouchFinderParams};
+pub(crate) use history::History;
+pub use incremental::delta::{PatchDelta, PatchVertex};
 pub use incremental::patcher::{PatchParams, Patcher, PatcherParams};
+pub use incremental::splice::Splice;
+pub use lattice::{
+    Edge, Lattice, LatticeNode, LatticeRegion, NodeValues, Owner, PatchFace, Square, VertexKey,
+};
+pub use support::Support;

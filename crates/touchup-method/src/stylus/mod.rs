@@ -35,18 +35,14 @@ pub use clocks::clock_offset::{ClockDrift, ClockEvidence, ClockOffset};
 pub use compensate::{
     Compensator, CompensatorParams, Payload, SensorBias, SensorMount, Tip, WrenchFrame,
 };
-pub use contact::Contact;
-pub use contact::TouchState;
-pub use contact::{ContactGate, ContactGateParams};
+pub use contact::{Contact, ContactGate, ContactGateParams, TouchState};
 pub(crate) use contact::{LONGEST_HOLD, STROKE_PAUSE_NS};
 pub use contact_estimator::{ContactEstimator, ContactEstimatorParams, ContactSample};
 pub(crate) use force_noise::ForceNoise;
 pub use frame_buffer::{FrameBuffer, FrameError, FrameTransform, plain_name};
-pub use friction::NormalEstimate;
 pub(crate) use friction::WIDEST_CONE_COSINE;
-pub use friction::{Friction, FrictionCoefficient, Sliding};
-pub use local_motion::LocalMotion;
-pub use local_motion::SmoothedMotion;
+pub use friction::{Friction, FrictionCoefficient, NormalEstimate, Sliding};
+pub use local_motion::{LocalMotion, SmoothedMotion};
 pub use markers::{
     MarkerBody, MarkerCounts, MarkerFilter, MarkerFrame, MarkerObservation, MarkerParams,
     SpringParams, Tracking,
@@ -56,8 +52,7 @@ pub use placement::Placement;
 pub use probed::ProbedPoint;
 pub use sync::Synchroniser;
 pub use sync_params::{SyncCounts, SyncParams};
-pub use tip_motion::Ball;
-pub use tip_motion::{SlidingParams, TipMotion, TipParams};
+pub use tip_motion::{Ball, SlidingParams, TipMotion, TipParams};
 pub(crate) use tip_shape::TipContact;
 pub use tip_shape::{TipBody, TipPlace, TipShape, TipSizes};
 

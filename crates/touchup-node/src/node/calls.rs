@@ -12,7 +12,7 @@ use super::error::NodeError;
 use super::feature_messages::kind_of;
 use super::refinement::RefinementWorker;
 use super::session::ResultFiles;
-use super::strokes::take_out::BUSY;
+use super::take_out::BUSY;
 use crate::ros::convert::{header, point_of, stamp_ns, trigger};
 use crate::ros::messages::{
     DetectFeaturesResponse, FlagFeatureRequest, FlagFeatureResponse, PointStamped, ProbeResult,

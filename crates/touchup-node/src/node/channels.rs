@@ -5,7 +5,7 @@ use std::sync::mpsc::SyncSender;
 
 use nalgebra::Point3;
 
-use super::viewing::variances::VertexVariance;
+use super::variances::VertexVariance;
 use crate::ros::mesh_feed::Edits;
 use crate::ros::messages::{
     DetectFeaturesRequest, DetectFeaturesResponse, FlagFeatureResponse, UnflagFeatureResponse,

@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 
 use tracing::{info, warn};
 
-use super::acceptance::{SampleVerdict, is_of_pairing, meaning};
 use super::error::NodeError;
+use super::input::acceptance::{SampleVerdict, is_of_pairing, meaning};
 use super::refinement::RefinementWorker;
 use super::session::{NodeEnd, SessionReport};
 use crate::ros::convert::header;

@@ -7,16 +7,15 @@
 //! only. Each longer piece of work beside (a save, variances, a check of the input, removal of a
 //! touch) has a short-lived thread, and the port has those of its network.
 
-mod acceptance;
 mod arm;
 mod calls;
 mod channels;
 mod diagnostics;
-mod doubts;
 mod error;
+mod evaluating_variances;
 mod feature_messages;
 mod feature_worker;
-mod frame_resolver;
+mod input;
 mod keeping;
 mod publishing;
 mod refinement;
@@ -25,8 +24,9 @@ mod session;
 mod setup;
 mod shared;
 mod side_work;
-mod streams;
 mod strokes;
+mod take_out;
+mod variances;
 mod viewing;
 
 pub use arm::{ArmKind, ArmOfNode};

@@ -9,18 +9,18 @@ use std::time::{Duration, Instant};
 
 use tracing::warn;
 
-use super::acceptance::Acceptance;
 use super::arm::ArmHandle;
 use super::channels::{FeatureInput, ViewInput};
-use super::doubts::InputDoubts;
 use super::error::NodeError;
-use super::frame_resolver::{FrameNames, FrameResolver, Refusal};
+use super::input::acceptance::Acceptance;
+use super::input::doubts::InputDoubts;
+use super::input::frame_resolver::{FrameNames, FrameResolver, Refusal};
+use super::input::streams::StreamWatch;
 use super::session::{NodeEnd, NodeSession};
 use super::setup::Setup;
 use super::side_work::SideWork;
-use super::streams::StreamWatch;
-use super::strokes::take_out::TakingOut;
-use super::viewing::variances::VarianceWork;
+use super::take_out::TakingOut;
+use super::variances::VarianceWork;
 use crate::ros::convert::{as_pose, frame_transform, stamp_ns};
 use crate::ros::inbox::Arrivals;
 use crate::ros::mesh_feed::Edits;

@@ -9,9 +9,9 @@ use chrono::{DateTime, Utc};
 use serde::Serialize;
 
 use super::error::NodeError;
+use super::input::streams::Epoch;
 use super::keeping::{Keeping, ReplayedSession};
 use super::setup::Setup;
-use super::streams::Epoch;
 use crate::ros::port::Port;
 use touchup_features::diagnose::InputMonitor;
 use touchup_io::session_folder::SessionFolder;

@@ -21,7 +21,7 @@ use super::connection;
 use super::downloads::{body_of, sessions};
 use super::page_place::PagePlace;
 use super::replay::{self, Replays};
-use super::reporting::reports;
+use super::reports;
 use super::site::Site;
 
 /// Maximum size of a message from a page, bytes.

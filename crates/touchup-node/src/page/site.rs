@@ -12,7 +12,7 @@ use super::admission::entrance::Entrance;
 use super::annotations::{AnnotateRequest, Annotations};
 use super::board::Board;
 use super::calls::{CallReply, Calls, MAY_ONLY_LOOK};
-use super::replay::ReplayControl;
+use super::replay_state::ReplayControl;
 use super::reporting::nominal::Nominal;
 use super::reporting::report_work::Reports;
 use crate::ros::inbox::Inbox;

@@ -25,12 +25,10 @@ mod way_out;
 mod world;
 
 pub use cell::RobotCell;
-pub use cone::NotReached;
-pub use cone::ShaftOrientation;
+pub use cone::{NotReached, ShaftOrientation};
 pub use dry_run::{HeldBack, Plan, PlannedMotion, plan};
 pub use ending::{Ending, FlagResult, ProbedSlide, ProbedTouch, ReferenceTouch};
-pub use links::LinkError;
-pub use links::{Clearance, Tool};
+pub use links::{Clearance, LinkError, Tool};
 pub use payload::{PayloadProbeError, PayloadReadings};
 pub use prober::{Flag, ProbeParams, Prober};
 pub use reference::References;

@@ -26,7 +26,6 @@ pub use decision::{DecidedCharacteristic, DecisionGoal, SoughtCharacteristic};
 pub use design::{Candidate, Knowledge, TargetUncertainties};
 pub use error::ExploreError;
 pub use explorer::{ExplorationResult, Explorer};
-pub use search_context::ExpectedTravel;
-pub use search_context::{FeatureQuantity, PatternParams, TouchPlan, TouchResult};
+pub use search_context::{ExpectedTravel, FeatureQuantity, PatternParams, TouchPlan, TouchResult};
 pub use slide::{Slide, Station};
 pub use tolerance::sigma_of;

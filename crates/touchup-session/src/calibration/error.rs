@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use touchup_features::align::PairsError;
 use touchup_features::calibrate::{PayloadError, TipError};
-use touchup_io::table::TableError;
+use touchup_io::tables::table::TableError;
 use touchup_method::stylus::SettingError;
 
 use crate::replay::ReplayError;

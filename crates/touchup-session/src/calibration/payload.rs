@@ -13,7 +13,7 @@ use serde::Serialize;
 use touchup_features::calibrate::{
     PayloadFit, PayloadParams, StaticPose, StaticSegmentFinder, StaticSegmentParams, fit_payload,
 };
-use touchup_io::static_poses::read_static_poses;
+use touchup_io::tables::static_poses::read_static_poses;
 use touchup_method::stylus::{Payload, SensorBias, WrenchFrame};
 use touchup_probing::execute::{NotReached, PayloadReadings};
 
@@ -72,7 +72,7 @@ pub fn calibrate_payload(
     })
 }
 
-/// Identifies the payload from a table of static poses ([`touchup_io::static_poses`]).
+/// Identifies the payload from a table of static poses ([`touchup_io::tables::static_poses`]).
 ///
 /// # Errors
 /// [`CalibrationError`]

@@ -6,7 +6,7 @@ use std::path::Path;
 use nalgebra::{Isometry3, Vector3, Vector6};
 use touchup_features::align::{PairsFit, PairsParams, PointPair, fit_pairs};
 use touchup_features::calibrate::{DwellFinder, DwellParams};
-use touchup_io::pairs_file::{PairsFile, read_pairs, read_scan_points};
+use touchup_io::tables::pairs_file::{PairsFile, read_pairs, read_scan_points};
 use touchup_method::stylus::{ContactEstimator, ContactEstimatorParams};
 
 use super::calibrated::{Calibration, CalibrationResult};
@@ -16,7 +16,7 @@ use super::vector::rounded;
 use crate::reported;
 use crate::scene::{GravityAxes, ScanToSpaceSection, Scene, Setting};
 
-/// Fits the pose of the scan to a table of pairs ([`touchup_io::pairs_file`]).
+/// Fits the pose of the scan to a table of pairs ([`touchup_io::tables::pairs_file`]).
 ///
 /// - `recording`: dwells of the stylus, one second on each point, in the order of the table; they
 ///   replace its columns of space, and the scene must give the radius of the ball.

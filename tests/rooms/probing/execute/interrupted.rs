@@ -11,7 +11,7 @@ use serde_json::Value;
 use tempfile::TempDir;
 use touchup::io::probed_touches_file::{TouchLine, read_probed_touches};
 use touchup::io::recording::{RecordingReader, Topics};
-use touchup::io::static_poses::read_static_poses;
+use touchup::io::tables::static_poses::read_static_poses;
 use touchup::stylus::Message;
 
 use super::command::cell;

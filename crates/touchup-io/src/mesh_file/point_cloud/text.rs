@@ -5,7 +5,7 @@ use nalgebra::{Point3, Vector3};
 use super::super::defect::{Defect, Syntax};
 use super::super::text::NumberedLines;
 use crate::file_error::FilePlace;
-use crate::table_rows::DecimalSign;
+use crate::tables::table_rows::DecimalSign;
 use touchup_geometry::mesh::{PointCloud, ScanStation};
 
 /// Bytes of the shortest line: three digits and their separators.

@@ -1,6 +1,6 @@
 //! A recording in table form: comma-separated values and their kin, a line for each instant.
 //!
-//! Separator and decimal sign hold for the whole table ([`crate::table_rows`]). An empty place, or
+//! Separator and decimal sign hold for the whole table ([`crate::tables::table_rows`]). An empty place, or
 //! NaN, in all columns of the position or of the force means no measurement at that instant.
 
 use std::fs::File;
@@ -14,7 +14,7 @@ use crate::recording::FilePlace;
 use crate::recording::error::BadMessage;
 use crate::recording::error::Damage;
 use crate::recording::error::RecordingError;
-use crate::table_rows::{DecimalSign, MAX_ROW_BYTES, RowError, TableRows};
+use crate::tables::table_rows::{DecimalSign, MAX_ROW_BYTES, RowError, TableRows};
 use touchup_method::stylus::{StampedPose, StampedWrench, Wrench, measured_rotation};
 
 /// Endings of the names of tables.

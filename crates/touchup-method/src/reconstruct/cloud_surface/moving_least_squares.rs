@@ -6,9 +6,7 @@ use crate::reconstruct::contour::crossing::Crossing;
 use crate::reconstruct::contour::dual_contouring::contour;
 use crate::reconstruct::contour::patched::Patch;
 use crate::reconstruct::contour::scan_clipping::Cut;
-use crate::reconstruct::field::lattice::{
-    Edge, Lattice, LatticeNode, LatticeRegion, NodeValues, node_at,
-};
+use crate::reconstruct::lattice::{Edge, Lattice, LatticeNode, LatticeRegion, NodeValues, node_at};
 use crate::reconstruct::table::CellTable;
 use touchup_geometry::mesh::{PointTree, Workers, map_by};
 

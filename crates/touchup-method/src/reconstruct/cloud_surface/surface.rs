@@ -6,7 +6,7 @@ use super::clean::UsablePoints;
 use super::moving_least_squares::OrientedPoints;
 use super::normals::{PointNeighbourhood, oriented};
 use super::summary::CloudSummary;
-use crate::reconstruct::field::lattice::Lattice;
+use crate::reconstruct::lattice::Lattice;
 use touchup_geometry::mesh::{PointCloud, PointTree, Workers, map_by};
 use touchup_geometry::numeric::DisjointSets;
 

@@ -6,9 +6,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use crate::reconstruct::field::lattice::{
-    Edge, Lattice, LatticeNode, Square, VertexKey, across, stepped,
-};
+use crate::reconstruct::lattice::{Edge, Lattice, LatticeNode, Square, VertexKey, across, stepped};
 use crate::reconstruct::table::CellTable;
 use touchup_geometry::mesh::{FaceId, TriMesh, VertexId};
 

@@ -9,8 +9,9 @@ use std::collections::HashSet;
 use meshopt::SimplifyOptions;
 use nalgebra::{Point3, center};
 
-use crate::reconstruct::contour::patched::{Patch, Support};
-use crate::reconstruct::field::lattice::{CellBox, Lattice, LatticeNode, Owner, PatchFace};
+use crate::reconstruct::contour::patched::Patch;
+use crate::reconstruct::lattice::{CellBox, Lattice, LatticeNode, Owner, PatchFace};
+use crate::reconstruct::support::Support;
 use crate::reconstruct::table::CellTable;
 use touchup_geometry::mesh::{BoxQuery, FaceId, FaceTree, TriMesh, triangle};
 
@@ -396,7 +397,7 @@ fn rim(faces: &[u32]) -> Vec<[u32; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::reconstruct::field::lattice::{Edge, VertexKey};
+    use crate::reconstruct::lattice::{Edge, VertexKey};
 
     /// A square of `side` by `side` cells, two faces each, at heights `z` (m) over cells of 1 mm.
     fn sheet(side: i32, z: impl Fn(i32, i32) -> f64) -> Patch {

@@ -2,10 +2,10 @@
 
 use nalgebra::{Point3, Vector3};
 
+use crate::reconstruct::evidence::piecewise::FieldScratch;
 use crate::reconstruct::evidence::point_evidence::{Evidence, Source};
 use crate::reconstruct::field::grid::ReconstructionGrid;
-use crate::reconstruct::field::lattice::{Edge, LatticeNode, stepped};
-use crate::reconstruct::field::piecewise::FieldScratch;
+use crate::reconstruct::lattice::{Edge, LatticeNode, stepped};
 use crate::reconstruct::table::CellTable;
 use touchup_geometry::numeric::direction;
 

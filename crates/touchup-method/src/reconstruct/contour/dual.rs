@@ -7,7 +7,7 @@
 
 use nalgebra::{Point3, Vector2, Vector3};
 
-use crate::reconstruct::field::lattice::{Lattice, Square, across};
+use crate::reconstruct::lattice::{Lattice, Square, across};
 use touchup_geometry::mesh::triangle::shape_quality;
 use touchup_geometry::numeric::direction;
 

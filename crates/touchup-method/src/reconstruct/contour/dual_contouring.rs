@@ -16,7 +16,7 @@ use crate::reconstruct::contour::patched::Patch;
 use crate::reconstruct::contour::qef::Planes;
 use crate::reconstruct::contour::scan_clipping::{Cut, TraceSegment};
 use crate::reconstruct::contour::trace::Polyline;
-use crate::reconstruct::field::lattice::{
+use crate::reconstruct::lattice::{
     CellBox, Edge, Lattice, LatticeNode, LatticeRegion, NodeValues, Owner, PatchFace, Square,
     VertexKey, node_at,
 };

@@ -4,7 +4,7 @@
 //! along the two axes that follow; its squares 2 · axis + (1 when above). A segment on a square
 //! leads from edge to edge with the material on its left, seen against the square's axis.
 
-use crate::reconstruct::field::lattice::{Edge, LatticeNode, Square, across, stepped};
+use crate::reconstruct::lattice::{Edge, LatticeNode, Square, across, stepped};
 
 /// No edge, no loop.
 pub(in crate::reconstruct) const NONE: u8 = u8::MAX;

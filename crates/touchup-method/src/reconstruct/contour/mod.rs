@@ -9,5 +9,4 @@ pub(in crate::reconstruct) mod loops;
 pub(in crate::reconstruct) mod patched;
 pub(in crate::reconstruct) mod qef;
 pub(in crate::reconstruct) mod scan_clipping;
-pub(in crate::reconstruct) mod splice;
 pub(in crate::reconstruct) mod trace;

@@ -1,9 +1,10 @@
 //! The patch, new faces for a part of a scan; and the patched scan, with support and uncertainty of
 //! each vertex.
 
+use crate::reconstruct::support::Support;
 use nalgebra::Point3;
 
-use crate::reconstruct::field::lattice::{LatticeNode, PatchFace, Square, VertexKey};
+use crate::reconstruct::lattice::{LatticeNode, PatchFace, Square, VertexKey};
 use crate::reconstruct::table::CellTable;
 use touchup_geometry::mesh::{FaceId, MeshError, TriMesh, VertexId};
 
@@ -61,21 +62,6 @@ pub struct OpenSquare {
     /// whether the scan crosses the square; if not, the field goes on past the end of the scan and
     /// the region would widen without end
     pub is_scanned: bool,
-}
-
-/// The evidence for a vertex, in the order of its numbers in files.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Support {
-    /// the scan
-    #[default]
-    Scan,
-    /// touches
-    Touched,
-    /// suggested by touches, free space and scan nearby; not touched itself
-    Guessed,
-    /// as guessed, and out of reach: the ball does not enter an inner corner, or a narrower gap,
-    /// that far
-    Unreachable,
 }
 
 /// A scan with its touched part remeshed.

@@ -4,7 +4,7 @@ use nalgebra::{Point2, Point3, Vector3};
 
 use crate::reconstruct::contour::clip::{Pieces, PointSupport, SideOrigin, wall};
 use crate::reconstruct::contour::patched::Patch;
-use crate::reconstruct::field::lattice::{
+use crate::reconstruct::lattice::{
     CellBox, Edge, Lattice, LatticeNode, LatticeRegion, Owner, PatchFace, Square, VertexKey,
 };
 use crate::reconstruct::table::{CellTable, Key};

@@ -4,9 +4,7 @@ use nalgebra::{Point2, Point3};
 
 use crate::reconstruct::contour::patched::OpenSquare;
 use crate::reconstruct::contour::scan_clipping::{Cut, ScanCrossing, TraceSegment};
-use crate::reconstruct::field::lattice::{
-    Edge, LatticeNode, NodeValues, Square, VertexKey, across,
-};
+use crate::reconstruct::lattice::{Edge, LatticeNode, NodeValues, Square, VertexKey, across};
 
 /// A polyline in which the scan crosses a square, from one of the square's edges to another, by
 /// their numbers; walking along it with the normal of the scan up, the region is on the left.

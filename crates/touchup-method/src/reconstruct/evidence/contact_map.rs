@@ -13,8 +13,8 @@ use nalgebra::{Point3, Vector3};
 use crate::reconstruct::evidence::contact_statistics::ContactStatistics;
 use crate::reconstruct::evidence::outliers::{Outlier, Outliers};
 use crate::reconstruct::evidence::touches::SurfaceContact;
-use crate::reconstruct::field::lattice::LatticeNode;
-use crate::reconstruct::incremental::history::{Direction, History};
+use crate::reconstruct::history::{Direction, History};
+use crate::reconstruct::lattice::LatticeNode;
 use crate::reconstruct::table::CellTable;
 use touchup_geometry::numeric::{direction, voxel_neighbourhood, voxel_of};
 

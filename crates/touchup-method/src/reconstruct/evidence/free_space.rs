@@ -3,8 +3,8 @@
 use nalgebra::{Point3, Vector3};
 
 use crate::reconstruct::evidence::voxel_set::{VoxelElement, VoxelSet};
-use crate::reconstruct::field::lattice::{CellBox, LatticeNode};
-use crate::reconstruct::incremental::history::Direction;
+use crate::reconstruct::history::Direction;
+use crate::reconstruct::lattice::{CellBox, LatticeNode};
 use crate::reconstruct::table::Key;
 use crate::stylus::{TipBody, TipPlace};
 use touchup_geometry::numeric::{voxel_neighbourhood, voxel_of};

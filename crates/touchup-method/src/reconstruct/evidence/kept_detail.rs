@@ -12,11 +12,11 @@
 
 use nalgebra::Vector3;
 
-use crate::reconstruct::contour::patched::Support;
 use crate::reconstruct::evidence::agreement::{Agreement, LARGEST_MISMATCH, RESTS};
 use crate::reconstruct::evidence::contact_map::MeanContact;
 use crate::reconstruct::evidence::point_evidence::Evidence;
-use crate::reconstruct::field::lattice::VertexKey;
+use crate::reconstruct::lattice::VertexKey;
+use crate::reconstruct::support::Support;
 use touchup_geometry::mesh::{BoxQuery, FaceTree, TriMesh, VertexId};
 
 /// Maximum edge length of a scan finer than the tip, in radii.

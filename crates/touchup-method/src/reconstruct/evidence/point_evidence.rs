@@ -6,9 +6,9 @@ use crate::reconstruct::evidence::agreement::{Agreement, BENT, ContactsAround, T
 use crate::reconstruct::evidence::contact_map::ContactMap;
 use crate::reconstruct::evidence::contact_uncertainty::UncertaintyParams;
 use crate::reconstruct::evidence::free_space::FreeSpace;
+use crate::reconstruct::evidence::inner_corner::is_inner_corner;
+use crate::reconstruct::evidence::piecewise::{FieldParams, FieldScratch, FieldValue};
 use crate::reconstruct::evidence::scan_distance::ScanDistance;
-use crate::reconstruct::field::inner_corner::is_inner_corner;
-use crate::reconstruct::field::piecewise::{FieldParams, FieldScratch, FieldValue};
 use touchup_geometry::mesh::{FaceTree, TriMesh};
 use touchup_geometry::numeric::direction;
 

@@ -4,8 +4,8 @@ use nalgebra::Point3;
 
 use crate::reconstruct::evidence::contact_map::ContactVerdict;
 use crate::reconstruct::evidence::touches::{SurfaceContact, TipTouch};
-use crate::reconstruct::field::lattice::LatticeNode;
-use crate::reconstruct::incremental::history::Direction;
+use crate::reconstruct::history::Direction;
+use crate::reconstruct::lattice::LatticeNode;
 use crate::reconstruct::table::CellTable;
 use crate::stylus::ProbedPoint;
 use touchup_geometry::numeric::voxel_of;

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::reconstruct::incremental::history::Direction;
+use crate::reconstruct::history::Direction;
 use crate::stylus::{STROKE_PAUSE_NS, TouchState};
 
 /// The samples of a stroke: from touch-down to the next touch-down, so including the path of the

@@ -1,7 +1,7 @@
 //! A voxel set: one element per key, in cubes, with stroke undo.
 
-use crate::reconstruct::field::lattice::LatticeNode;
-use crate::reconstruct::incremental::history::{Direction, History};
+use crate::reconstruct::history::{Direction, History};
+use crate::reconstruct::lattice::LatticeNode;
 use crate::reconstruct::table::{CellTable, Key};
 
 /// Maximum number of cubes for undo: some tens of MB.

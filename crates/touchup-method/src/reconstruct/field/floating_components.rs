@@ -7,7 +7,7 @@ use std::collections::VecDeque;
 
 use crate::reconstruct::evidence::point_evidence::{Evidence, NodeState, Source};
 use crate::reconstruct::field::grid::ReconstructionGrid;
-use crate::reconstruct::field::lattice::{LatticeNode, neighbours};
+use crate::reconstruct::lattice::{LatticeNode, neighbours};
 use crate::reconstruct::table::CellTable;
 
 /// Maximum number of nodes of a floating component: a plug eight radii wide and as high.

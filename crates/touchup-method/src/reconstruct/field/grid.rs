@@ -4,35 +4,17 @@ use std::collections::BTreeSet;
 
 use nalgebra::Point3;
 
+use crate::reconstruct::evidence::piecewise::FieldScratch;
 use crate::reconstruct::evidence::point_evidence::{
     Evidence, FREE_REACH, NodeState, SCAN_REMOVAL, SWEPT_REACH, Source,
 };
 use crate::reconstruct::evidence::scan_distance::ScanDistance;
-use crate::reconstruct::field::lattice::{
+use crate::reconstruct::evidence_changes::GridChanges;
+use crate::reconstruct::lattice::{
     CellBox, Lattice, LatticeNode, LatticeRegion, NodeValues, cell_at, neighbours, node_at,
 };
-use crate::reconstruct::field::piecewise::FieldScratch;
 use crate::reconstruct::table::CellTable;
 use touchup_geometry::numeric::{VoxelKey, voxel_neighbourhood, voxel_of};
-
-/// Changes of the evidence: points of the contacts with a new or moved mean, and changed centres of
-/// the tip, m, in O.
-#[derive(Clone, Debug, Default)]
-pub(in crate::reconstruct) struct GridChanges {
-    pub means: Vec<Point3<f64>>,
-    pub centres: Vec<Point3<f64>>,
-}
-
-impl GridChanges {
-    pub(crate) fn is_empty(&self) -> bool {
-        self.means.is_empty() && self.centres.is_empty()
-    }
-
-    pub(crate) fn extend(&mut self, more: &Self) {
-        self.means.extend_from_slice(&more.means);
-        self.centres.extend_from_slice(&more.centres);
-    }
-}
 
 /// Changes from a renewal.
 #[derive(Clone, Debug, Default)]

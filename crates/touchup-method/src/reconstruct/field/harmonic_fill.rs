@@ -7,7 +7,7 @@
 
 use crate::reconstruct::evidence::point_evidence::{NodeState, Source};
 use crate::reconstruct::field::grid::ReconstructionGrid;
-use crate::reconstruct::field::lattice::{self, LatticeNode, Numbers, cell_at, node_at};
+use crate::reconstruct::lattice::{self, LatticeNode, Numbers, cell_at, node_at};
 use crate::reconstruct::table::CellTable;
 use touchup_geometry::numeric::flood;
 
@@ -284,7 +284,7 @@ fn is_unsupported_surface(grid: &ReconstructionGrid, cell: LatticeNode) -> bool 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::reconstruct::field::lattice::{CellBox, Lattice};
+    use crate::reconstruct::lattice::{CellBox, Lattice};
 
     const PITCH: f64 = 0.75e-3;
     const BOX: CellBox = CellBox {

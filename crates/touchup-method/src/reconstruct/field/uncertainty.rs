@@ -7,12 +7,12 @@
 
 use nalgebra::Point3;
 
-use crate::reconstruct::contour::patched::Support;
 use crate::reconstruct::evidence::contact_map::ContactMap;
-use crate::reconstruct::evidence::point_evidence::Evidence;
-use crate::reconstruct::field::piecewise::{
+use crate::reconstruct::evidence::piecewise::{
     FieldParams, FieldScratch, FieldValue, Member, PassShare,
 };
+use crate::reconstruct::evidence::point_evidence::Evidence;
+use crate::reconstruct::support::Support;
 
 /// Uncertainty of the fit, by cause; standard deviations, m.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -4,9 +4,10 @@ use nalgebra::Point3;
 
 use crate::reconstruct::LatticeRegion;
 use crate::reconstruct::contour::coarsening::CoarseBlocks;
-use crate::reconstruct::contour::patched::{Patch, Support};
-use crate::reconstruct::field::lattice::{CellBox, LatticeNode, Owner, VertexKey};
+use crate::reconstruct::contour::patched::Patch;
 use crate::reconstruct::incremental::remesh::{Remesh, RenewedFaces};
+use crate::reconstruct::lattice::{CellBox, LatticeNode, Owner, VertexKey};
+use crate::reconstruct::support::Support;
 use crate::reconstruct::table::CellTable;
 use touchup_geometry::mesh::{FaceId, TriMesh};
 

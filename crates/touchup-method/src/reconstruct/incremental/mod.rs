@@ -1,7 +1,7 @@
 //! Incremental update of field, faces, and the mesh that follows.
 
 pub(in crate::reconstruct) mod delta;
-pub(in crate::reconstruct) mod history;
 pub(in crate::reconstruct) mod patcher;
 pub(in crate::reconstruct) mod remesh;
+pub mod splice;
 pub(in crate::reconstruct) mod update;

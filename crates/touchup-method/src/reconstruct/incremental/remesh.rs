@@ -4,11 +4,13 @@ use crate::reconstruct::LatticeRegion;
 use crate::reconstruct::contour::coarsening::CoarseBlocks;
 use crate::reconstruct::contour::crossing::Crossings;
 use crate::reconstruct::contour::dual_contouring::contour_in;
-use crate::reconstruct::contour::patched::{Patch, Support};
+use crate::reconstruct::contour::patched::Patch;
 use crate::reconstruct::contour::scan_clipping::{Cut, cells_around, faces_near};
 use crate::reconstruct::evidence::point_evidence::{Evidence, NodeState, Source};
-use crate::reconstruct::field::grid::{GridChanges, LatticeChanges, ReconstructionGrid, cells_of};
-use crate::reconstruct::field::lattice::{CellBox, Lattice, LatticeNode, VertexKey, node_at};
+use crate::reconstruct::evidence_changes::GridChanges;
+use crate::reconstruct::field::grid::{LatticeChanges, ReconstructionGrid, cells_of};
+use crate::reconstruct::lattice::{CellBox, Lattice, LatticeNode, VertexKey, node_at};
+use crate::reconstruct::support::Support;
 use crate::reconstruct::table::CellTable;
 use touchup_geometry::mesh::FaceId;
 

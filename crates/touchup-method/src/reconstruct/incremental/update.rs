@@ -4,7 +4,7 @@ use crate::reconstruct::evidence::point_evidence::{Evidence, NodeState, Source};
 use crate::reconstruct::field::floating_components::floating_components;
 use crate::reconstruct::field::grid::{EarlierStates, LatticeChanges, ReconstructionGrid};
 use crate::reconstruct::field::harmonic_fill::{end_reach, harmonic_fill, open_cells};
-use crate::reconstruct::field::lattice::{CellBox, LatticeNode, Numbers, stepped};
+use crate::reconstruct::lattice::{CellBox, LatticeNode, Numbers, stepped};
 
 /// Minimum change of a node's value, in cells: 3 µm for a ball of 1.5 mm.
 const SLACK: f64 = 4e-3;

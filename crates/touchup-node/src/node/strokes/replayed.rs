@@ -1,9 +1,9 @@
 //! Replay of a recorded session: strokes are undone, redone, removed and restored at their recorded
 //! times, and nothing else acts on it.
 
-use super::take_out::NO_PATCH;
 use crate::node::keeping::{Keeping, ReplayedSession};
 use crate::node::refinement::RefinementWorker;
+use crate::node::take_out::NO_PATCH;
 use crate::ros::messages::ProbeResult;
 use crate::ros::port::{Arrival, Call, ReplayStep};
 use touchup_session::session::{EvidenceSource, Removal, StrokeChange};

@@ -10,11 +10,11 @@ use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use tracing::warn;
 
 use super::replayed::REPLAYED;
-use super::take_out::{
+use crate::node::refinement::RefinementWorker;
+use crate::node::take_out::{
     BUSY, MOST_ASKED, NO_PATCH, NOTHING_TOUCHED, READ_WAIT, Remade, TakingOut, WantedTouch,
     answer_of, counted_contacts, named, read, refused, touch_of, touches_of,
 };
-use crate::node::refinement::RefinementWorker;
 use crate::ros::messages::{TakeOutTouchRequest, TakeOutTouchResponse};
 use crate::ros::port::Reply;
 use touchup_method::reconstruct::{Patcher, StrokeSpan};

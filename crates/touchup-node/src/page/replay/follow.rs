@@ -7,11 +7,11 @@ use axum::extract::ws::{Message, WebSocket};
 use tokio::time::timeout;
 
 use super::replays::{Replay, Replays};
-use super::shown::ReplayShown;
 use crate::page::admission::access::Role;
 use crate::page::board::text_of;
 use crate::page::connection;
 use crate::page::page_place::PagePlace;
+use crate::page::replay_state::ReplayShown;
 use crate::page::site::Site;
 
 /// Interval of progress messages while the session loads.

@@ -4,14 +4,10 @@
 //! Pages of one session share its replay, which ends with the last of them. Its threads yield to
 //! those of the running node.
 
-mod control;
 mod follow;
 mod player;
-mod progress;
 mod recording;
 mod replays;
-mod shown;
 
-pub(super) use self::control::ReplayControl;
 pub(super) use self::follow::serve;
 pub(super) use self::replays::Replays;

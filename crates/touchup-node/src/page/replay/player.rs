@@ -8,8 +8,6 @@ use std::sync::atomic::AtomicUsize;
 use tokio::runtime::Handle;
 use tokio::sync::watch;
 
-use super::control::ReplayControl;
-use super::progress::ReplayNext;
 use super::recording::SessionRecording;
 use crate::node::{Node, PreparedNode, ReplayedSession};
 use crate::page::admission::entrance::Entrance;
@@ -18,6 +16,8 @@ use crate::page::board::Board;
 use crate::page::calls::Calls;
 use crate::page::knowledge;
 use crate::page::page_port::PagePort;
+use crate::page::replay_state::ReplayControl;
+use crate::page::replay_state::ReplayNext;
 use crate::page::reporting::report_work::Reports;
 use crate::page::site::{ScanShown, Site};
 use crate::ros::in_process::{self, OtherParticipants};

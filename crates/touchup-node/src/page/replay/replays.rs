@@ -9,10 +9,10 @@ use tokio::runtime::Handle;
 use tokio::sync::{Semaphore, watch};
 use tokio::time::timeout;
 
-use super::control::ReplayControl;
 use super::player::{OpenedReplay, Player};
 use crate::page::admission::entrance::Entrance;
 use crate::page::background;
+use crate::page::replay_state::ReplayControl;
 use crate::ros::locked;
 use touchup_io::session_folder::SessionFolder;
 use touchup_session::clock::Clock;

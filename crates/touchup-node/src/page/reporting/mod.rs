@@ -3,4 +3,3 @@
 pub mod nominal;
 pub mod report_request;
 pub mod report_work;
-pub mod reports;

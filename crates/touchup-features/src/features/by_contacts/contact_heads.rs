@@ -7,10 +7,10 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::feature::{Feature, FeatureKind, FittedTo};
-use super::fit::{Cylinder, FitParams, Observation, fit};
-use super::measure::{FittedSurface, Measure};
-use super::observe::SegmentTouches;
+use crate::features::feature::{Feature, FeatureKind, FittedTo};
+use crate::features::fit::{Cylinder, FitParams, Observation, fit};
+use crate::features::measure::{FittedSurface, Measure};
+use crate::features::observe::SegmentTouches;
 use touchup_geometry::numeric::{median, tangent_basis};
 
 /// Widths of heads, in bores.
@@ -33,7 +33,7 @@ const DEPTHS: std::ops::Range<f64> = 0.25..3.0;
 const SQUARE: f64 = 0.9945;
 
 /// The head of a counterbored hole.
-pub(super) struct Counterbore {
+pub(in crate::features) struct Counterbore {
     pub wall: FittedSurface<Cylinder>,
     /// numbers of the touches on its floor
     pub floor: Vec<u32>,
@@ -61,7 +61,7 @@ struct BoreContact {
 }
 
 /// The head around a touched bore, above its floor; `None` if contacts show none.
-pub(super) fn head_of(measure: &Measure, bore: &Feature) -> Option<Counterbore> {
+pub(in crate::features) fn head_of(measure: &Measure, bore: &Feature) -> Option<Counterbore> {
     let observed = measure.observed;
     let (axis, narrow) = (
         bore.axis.as_ref()?.value,

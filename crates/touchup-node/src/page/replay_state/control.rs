@@ -67,7 +67,7 @@ impl ReplayControl {
     }
 
     /// Whether no page follows the replay.
-    pub(super) fn is_closed(&self) -> bool {
+    pub(in crate::page) fn is_closed(&self) -> bool {
         locked(&self.progress).is_closed
     }
 
@@ -75,13 +75,13 @@ impl ReplayControl {
     ///
     /// - `end_ns`: time of the last message.
     /// - `damage`: position of damage, at which the recording ends.
-    pub(super) fn begin(&self, end_ns: i64, damage: Option<String>) {
+    pub(in crate::page) fn begin(&self, end_ns: i64, damage: Option<String>) {
         let mut progress = locked(&self.progress);
         (progress.is_ready, progress.end_ns, progress.damage) = (true, end_ns, damage);
     }
 
     /// Stops with an error; returns when no page follows the replay.
-    pub(super) fn fail(&self, why: String) {
+    pub(in crate::page) fn fail(&self, why: String) {
         let mut progress = locked(&self.progress);
         progress.error = Some(why);
         while !progress.is_closed {
@@ -90,7 +90,7 @@ impl ReplayControl {
     }
 
     /// Returns when the message of a time is due.
-    pub(super) fn wait_for(&self, at_ns: i64) -> ReplayNext {
+    pub(in crate::page) fn wait_for(&self, at_ns: i64) -> ReplayNext {
         let mut progress = locked(&self.progress);
         loop {
             if let Some(next) = progress.left() {
@@ -108,7 +108,7 @@ impl ReplayControl {
     }
 
     /// After the last message: returns when the replay restarts, or no page follows it.
-    pub(super) fn wait_at_end(&self) -> ReplayNext {
+    pub(in crate::page) fn wait_at_end(&self) -> ReplayNext {
         let mut progress = locked(&self.progress);
         progress.is_at_end = true;
         loop {

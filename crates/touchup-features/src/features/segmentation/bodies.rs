@@ -12,7 +12,7 @@ use touchup_geometry::numeric::{DisjointSets, distinct};
 
 /// The closed pieces of a mesh with more than one piece.
 #[derive(Default)]
-pub(super) struct Bodies {
+pub(in crate::features) struct Bodies {
     /// number of the piece of each face; empty for a single piece
     piece_of: Vec<u32>,
     /// body of each piece, `None` if it has a border; empty for a single piece
@@ -28,7 +28,7 @@ struct ClosedBody {
 
 /// Surroundings of a place: its body, or the whole mesh.
 #[derive(Clone, Copy)]
-pub(super) struct Surroundings<'a> {
+pub(in crate::features) struct Surroundings<'a> {
     mesh: &'a TriMesh,
     tree: &'a FaceTree,
     /// ids in the whole mesh, for a body

@@ -9,7 +9,7 @@ pub(super) const LOOK: Duration = Duration::from_secs(60);
 
 /// Next action of the player.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum ReplayNext {
+pub(in crate::page) enum ReplayNext {
     /// send the message
     Go,
     /// restart the replay
@@ -20,7 +20,7 @@ pub(super) enum ReplayNext {
 
 /// Pace and position of a replay. Times are along the recording without its long pauses, ns.
 #[derive(Debug)]
-pub(super) struct ReplayProgress {
+pub(in crate::page) struct ReplayProgress {
     pub is_ready: bool,
     pub speed: f64,
     pub is_paused: bool,

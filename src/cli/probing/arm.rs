@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 
-use super::arm_errors::ArmErrorsName;
-use super::progress::WorkProgress;
-use super::signals::StopSignals;
+use super::{KeptMeasurements, ProbingSetup, SpotWorld, millimetres};
 use crate::cli::CliError;
-use crate::cli::probing::{KeptMeasurements, ProbingSetup, SpotWorld, millimetres};
+use crate::cli::common::arm_errors::ArmErrorsName;
+use crate::cli::common::progress::WorkProgress;
+use crate::cli::common::signals::StopSignals;
 use touchup_features::calibrate::ReferenceSphere;
 use touchup_geometry::mesh::TriMesh;
 use touchup_io::mesh_file::MeshUnit;

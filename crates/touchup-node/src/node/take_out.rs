@@ -15,20 +15,20 @@ use touchup_session::live::EvidenceReplay;
 use touchup_session::session::StrokeChange;
 
 /// Maximum time of disk and patch until the touches are readable.
-pub(in crate::node) const READ_WAIT: Duration = Duration::from_secs(30);
+pub(super) const READ_WAIT: Duration = Duration::from_secs(30);
 /// Maximum number of contacts in an answer, so that it fits into one packet.
 const MOST_POINTS: usize = 24;
 /// Maximum number of concurrent queries: each has a copy of all touches.
-pub(in crate::node) const MOST_ASKED: usize = 4;
+pub(super) const MOST_ASKED: usize = 4;
 
 /// Answer to other calls meanwhile.
-pub(in crate::node) const BUSY: &str =
+pub(super) const BUSY: &str =
     "a touch is being taken out or put back: call again when that is done";
-pub(in crate::node) const NOTHING_TOUCHED: &str = "nothing is touched yet that could be taken out";
-pub(in crate::node) const NO_PATCH: &str = "the scene has no patch, so each touch has moved the mesh for good: `~/undo` takes the last ones back";
+pub(super) const NOTHING_TOUCHED: &str = "nothing is touched yet that could be taken out";
+pub(super) const NO_PATCH: &str = "the scene has no patch, so each touch has moved the mesh for good: `~/undo` takes the last ones back";
 
 /// A running removal or restoration of a touch.
-pub(in crate::node) struct TakingOut {
+pub(super) struct TakingOut {
     pub reply: Reply<TakeOutTouchResponse>,
     pub made: Receiver<Result<Remade, String>>,
     /// the answer, once the evidence is replaced and the mesh follows
@@ -36,32 +36,32 @@ pub(in crate::node) struct TakingOut {
 }
 
 /// The recomputed evidence, and its answer.
-pub(in crate::node) struct Remade {
+pub(super) struct Remade {
     pub evidence: EvidenceReplay,
     pub change: StrokeChange,
     pub answer: TakeOutTouchResponse,
 }
 
 /// Requested touch.
-pub(in crate::node) enum WantedTouch {
+pub(super) enum WantedTouch {
     /// touch with this touch-down, ns
     Named(i64),
     /// touch of the contact nearest to a position, up to a distance, m, in O
     Near(Point3<f64>, f64),
 }
 
-pub(in crate::node) fn refused(message: String) -> TakeOutTouchResponse {
+pub(super) fn refused(message: String) -> TakeOutTouchResponse {
     TakeOutTouchResponse {
         message,
         ..Default::default()
     }
 }
 
-pub(in crate::node) fn read<T, E>(received: Result<T, E>) -> Result<T, String> {
+pub(super) fn read<T, E>(received: Result<T, E>) -> Result<T, String> {
     received.map_err(|_| "what was touched could not be read in time: call again".to_owned())
 }
 
-pub(in crate::node) fn counted_contacts(count: usize) -> String {
+pub(super) fn counted_contacts(count: usize) -> String {
     format!(
         "{count} {}",
         if count == 1 { "contact" } else { "contacts" }
@@ -69,7 +69,7 @@ pub(in crate::node) fn counted_contacts(count: usize) -> String {
 }
 
 /// The touch-down named by a request, ns.
-pub(in crate::node) fn named(request: &TakeOutTouchRequest) -> Result<Option<i64>, String> {
+pub(super) fn named(request: &TakeOutTouchRequest) -> Result<Option<i64>, String> {
     let stamp_ns = stamp_ns(&request.touch).ok_or("the stamp of the touch is no time")?;
     Ok(Some(stamp_ns).filter(|stamp_ns| *stamp_ns != 0))
 }
@@ -78,7 +78,7 @@ pub(in crate::node) fn named(request: &TakeOutTouchRequest) -> Result<Option<i64
 ///
 /// - `patcher`: a copy.
 /// - `last_ns`: stamp of the last sample; an unfinished stroke ends there.
-pub(in crate::node) fn touch_of(
+pub(super) fn touch_of(
     mut patcher: Patcher,
     wanted: Option<&WantedTouch>,
     last_ns: i64,
@@ -117,7 +117,7 @@ pub(in crate::node) fn touch_of(
 }
 
 /// The stored contacts of a stroke, in order of time.
-pub(in crate::node) fn touches_of(patcher: &Patcher, span: StrokeSpan) -> Vec<ProbedPoint> {
+pub(super) fn touches_of(patcher: &Patcher, span: StrokeSpan) -> Vec<ProbedPoint> {
     patcher
         .probed()
         .iter()
@@ -126,7 +126,7 @@ pub(in crate::node) fn touches_of(patcher: &Patcher, span: StrokeSpan) -> Vec<Pr
         .collect()
 }
 
-pub(in crate::node) fn answer_of(
+pub(super) fn answer_of(
     span: StrokeSpan,
     touches: &[ProbedPoint],
     message: String,

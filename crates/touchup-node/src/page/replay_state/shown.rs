@@ -43,7 +43,7 @@ impl ReplayShown {
 /// The request of `~/replay`; a missing field keeps its value.
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct ReplayRequest {
+pub(in crate::page) struct ReplayRequest {
     pub speed: Option<f64>,
     pub is_paused: Option<bool>,
     pub at_s: Option<f64>,

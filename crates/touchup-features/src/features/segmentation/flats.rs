@@ -5,7 +5,7 @@ use touchup_geometry::numeric::flood;
 
 /// Cosine of the maximum angle across an edge inside a region, and of a face's normal from its
 /// plane: half of a polygon of 9 sides, 40°.
-pub(super) const SMOOTH: f64 = 0.766;
+pub(in crate::features) const SMOOTH: f64 = 0.766;
 /// Minimum share of a drawing's faces in one plane with a neighbour.
 const DRAWN_SHARE: f64 = 0.2;
 /// Tolerance of one plane, 1 − cos: 0.01°, the effect of single precision on small faces.
@@ -13,7 +13,7 @@ const COPLANAR: f64 = 1.5e-8;
 
 /// Flat pieces, computed on demand.
 #[derive(Clone, Debug)]
-pub(super) struct Flats {
+pub(in crate::features) struct Flats {
     /// number of the piece of each face, if known
     of_face: Vec<u32>,
     flats: Vec<FlatPiece>,
@@ -21,7 +21,7 @@ pub(super) struct Flats {
 
 /// A flat piece.
 #[derive(Clone, Debug)]
-pub(super) struct FlatPiece {
+pub(in crate::features) struct FlatPiece {
     pub faces: Vec<u32>,
     /// m²
     pub area: f64,

@@ -4,7 +4,7 @@
 use nalgebra::{Matrix2, Matrix3, Point3, SVector, Vector2, Vector3};
 
 use super::facets::Facets;
-use super::fit::{Cone, Cylinder, FREEDOMS, Freedom, Plane, Steps, SurfaceModel};
+use crate::features::fit::{Cone, Cylinder, FREEDOMS, Freedom, Plane, Steps, SurfaceModel};
 use touchup_geometry::mesh::{FaceId, VertexId};
 use touchup_geometry::numeric::{NormalEquations, tangent_basis};
 
@@ -52,10 +52,15 @@ impl Primitive {
 }
 
 /// Cosine of the tolerance between the normals of a face and its primitive: 25°.
-pub(super) const FACES_ALIKE: f64 = 0.906;
+pub(in crate::features) const FACES_ALIKE: f64 = 0.906;
 
 /// Whether a face lies on the primitive within `tolerance` (m), with a like normal.
-pub(super) fn belongs(facets: &Facets, face: u32, primitive: &Primitive, tolerance: f64) -> bool {
+pub(in crate::features) fn belongs(
+    facets: &Facets,
+    face: u32,
+    primitive: &Primitive,
+    tolerance: f64,
+) -> bool {
     let normal = match primitive {
         // most are planes: loads and computes no more than they need
         Primitive::Plane(plane) => {
@@ -112,7 +117,7 @@ const LOWER: [(usize, usize); 6] = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 
 /// moments of the area; `None` without area.
 ///
 /// - `origin`: near the faces, so that squares stay small.
-pub(super) fn plane_of(
+pub(in crate::features) fn plane_of(
     facets: &Facets,
     origin: Point3<f64>,
     faces: impl Iterator<Item = u32>,
@@ -161,7 +166,7 @@ pub(super) fn plane_of(
 
 /// Statistics of the normals of a curved surface.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct NormalSpread {
+pub(in crate::features) struct NormalSpread {
     /// largest standard deviation of the normals from their mean
     pub spread: f64,
     /// second moments of the normals
@@ -215,7 +220,7 @@ fn root(x: f64) -> f64 {
 const CLEAR: f64 = 0.5;
 
 /// The cylinder about this axis from normals: the lines along them meet at its axis.
-pub(super) fn cylinder_of(
+pub(in crate::features) fn cylinder_of(
     facets: &Facets,
     faces: &[u32],
     axis: &Vector3<f64>,
@@ -267,7 +272,11 @@ const MOST_ROWS: usize = 500;
 
 /// The curved surface fitted by least squares to the corners of the faces, and a cylinder also to
 /// their normals; planes stay the same.
-pub(super) fn refined(primitive: &Primitive, facets: &Facets, faces: &[u32]) -> Option<Primitive> {
+pub(in crate::features) fn refined(
+    primitive: &Primitive,
+    facets: &Facets,
+    faces: &[u32],
+) -> Option<Primitive> {
     match primitive {
         _ if faces.is_empty() => None,
         Primitive::Plane(_) => Some(*primitive),

@@ -4,9 +4,9 @@ use std::path::Path;
 use std::thread::{Builder, sleep};
 use std::time::Duration;
 
-use super::path_parameter::path;
-use super::signals::SignalledNode;
-use super::web::WebFlags;
+use super::common::path_parameter::path;
+use super::common::signals::SignalledNode;
+use super::common::web::WebFlags;
 use crate::cli::replay::play;
 use crate::cli::{CliError, notify};
 use touchup_io::mesh_file::MeshUnit;
@@ -23,7 +23,7 @@ const LOOK: Duration = Duration::from_millis(100);
 
 /// Plays a recording in real time once a page is open; the node runs on until a signal, for viewing
 /// and saving the results. Returns the node's end.
-pub(in crate::cli) fn on_page(
+pub(super) fn on_page(
     web: &WebFlags,
     parameters: Parameters,
     recording: Recording,
@@ -62,7 +62,7 @@ pub(in crate::cli) fn on_page(
 /// Parameters of a node on a scan.
 ///
 /// - `sessions`: folder for sessions.
-pub(in crate::cli) fn parameters_of(
+pub(super) fn parameters_of(
     scan: &Path,
     unit: MeshUnit,
     sessions: &Path,

@@ -10,9 +10,9 @@ use std::time::{Duration, Instant};
 
 use tracing::warn;
 
-use super::variances::{VarianceState, VertexVariance, evaluated};
 use crate::node::channels::ViewInput;
 use crate::node::refinement::RefinementWorker;
+use crate::node::variances::{VarianceState, VertexVariance, evaluated};
 
 /// Time without samples after which the variances are computed: longer than the node takes to
 /// settle the mesh.
@@ -22,7 +22,7 @@ const COPY_WAIT: Duration = Duration::from_secs(30);
 
 impl RefinementWorker {
     /// Starts the computation of variances when due, and passes on its result; never waits.
-    pub(in crate::node) fn go_on_with_variance(&mut self, now: Instant) {
+    pub(super) fn go_on_with_variance(&mut self, now: Instant) {
         let is_done = self
             .variance
             .done

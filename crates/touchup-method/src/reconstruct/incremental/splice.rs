@@ -1,7 +1,7 @@
 //! A mesh that follows the patch.
 
-use crate::reconstruct::field::lattice::{Owner, VertexKey};
 use crate::reconstruct::incremental::delta::{PatchDelta, PatchVertex};
+use crate::reconstruct::lattice::{Owner, VertexKey};
 use crate::reconstruct::table::CellTable;
 use touchup_geometry::mesh::{FaceId, FaceTree, MeshError, TriMesh, VertexId};
 

@@ -12,7 +12,7 @@ const MOST_PIECES: f64 = 1000.0;
 const ON_EDGE: f64 = 1e-9;
 
 /// Casts rays through one mesh.
-pub(super) struct Rays<'a> {
+pub(in crate::features) struct Rays<'a> {
     mesh: &'a TriMesh,
     tree: &'a FaceTree,
     /// length of the pieces of a line, m: a box around a long one holds too many faces
@@ -24,7 +24,7 @@ pub(super) struct Rays<'a> {
 
 /// The first face on a line.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct RayHit {
+pub(in crate::features) struct RayHit {
     /// from the start, m
     pub distance: f64,
     pub face: FaceId,

@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 
 use tracing::warn;
 
-use super::setup::Setup;
-use super::side_work::SideWork;
+use crate::node::setup::Setup;
+use crate::node::side_work::SideWork;
 use crate::ros::locked;
 use touchup_features::diagnose::{InputCause, InputFinding, InputMonitor};
 use touchup_session::clock::Clock;

@@ -5,8 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Matrix3, Point2, Point3, Vector2, Vector3};
 
-use super::fit::SurfaceModel;
-use super::scene::SegmentedMesh;
+use crate::features::fit::SurfaceModel;
+use crate::features::segmentation::scene::SegmentedMesh;
 use touchup_geometry::numeric::{DisjointSets, PointGrid, VoxelKey, spreads, voxel_of};
 use touchup_method::stylus::ProbedPoint;
 
@@ -17,20 +17,20 @@ const THIN: f64 = 0.25;
 const ON_PLANE_SIGMAS: f64 = 4.0;
 const ON_PLANE: f64 = 0.06;
 /// Cosine of the tolerance of its normal: 25°.
-pub(super) const ALIKE: f64 = 0.906;
+pub(in crate::features) const ALIKE: f64 = 0.906;
 /// Maximum distance of connected contacts, in radii of the ball.
-pub(super) const TOGETHER: f64 = 1.6;
+pub(in crate::features) const TOGETHER: f64 = 1.6;
 /// A wall's contacts are square to its axis within 20°: friction and noise.
-pub(super) const SQUARE: f64 = 0.34;
+pub(in crate::features) const SQUARE: f64 = 0.34;
 /// Directions of axes are the same within 3°.
 const SAME_AXIS: f64 = 0.9986;
 /// Maximum number of axes, the largest planes first.
 const MOST_AXES: usize = 12;
 /// Minimum number of contacts on a wall.
-pub(super) const LEAST: usize = 12;
+pub(in crate::features) const LEAST: usize = 12;
 
 /// A contact seen along an axis.
-pub(super) struct ProjectedContact {
+pub(in crate::features) struct ProjectedContact {
     pub touch: usize,
     /// centre of the ball, m
     pub at: Point2<f64>,
@@ -41,7 +41,7 @@ pub(super) struct ProjectedContact {
 /// Contacts seen along an axis.
 ///
 /// - `plane`: two directions square to the axis
-pub(super) fn projected(
+pub(in crate::features) fn projected(
     touches: &[ProbedPoint],
     members: &[usize],
     [e, g]: [Vector3<f64>; 2],
@@ -59,7 +59,7 @@ pub(super) fn projected(
 }
 
 /// Thinned contacts: one per cell.
-pub(super) fn thinned(touches: &[ProbedPoint]) -> Vec<usize> {
+pub(in crate::features) fn thinned(touches: &[ProbedPoint]) -> Vec<usize> {
     let mut seen = BTreeSet::<VoxelKey>::new();
     let mut is_new = |touch: &ProbedPoint| seen.insert(voxel_of(&touch.point, THIN * touch.radius));
     let is_sound = |touch: &ProbedPoint| !touch.is_rejected && touch.radius > 0.0;
@@ -69,7 +69,7 @@ pub(super) fn thinned(touches: &[ProbedPoint]) -> Vec<usize> {
 }
 
 /// Numbers of the planes under possible holes, the largest first.
-pub(super) fn large_planes(parted: &SegmentedMesh) -> Vec<usize> {
+pub(in crate::features) fn large_planes(parted: &SegmentedMesh) -> Vec<usize> {
     let mut numbers: Vec<usize> = parted
         .planes()
         .map(|(number, ..)| number)
@@ -80,7 +80,11 @@ pub(super) fn large_planes(parted: &SegmentedMesh) -> Vec<usize> {
 }
 
 /// Whether a contact is on the plane of a segment.
-pub(super) fn is_on(parted: &SegmentedMesh, number: usize, touch: &ProbedPoint) -> bool {
+pub(in crate::features) fn is_on(
+    parted: &SegmentedMesh,
+    number: usize,
+    touch: &ProbedPoint,
+) -> bool {
     let Some(plane) = parted.plane(number) else {
         return false;
     };
@@ -90,7 +94,7 @@ pub(super) fn is_on(parted: &SegmentedMesh, number: usize, touch: &ProbedPoint) 
 }
 
 /// Candidate directions of axes.
-pub(super) fn axes(
+pub(in crate::features) fn axes(
     parted: &SegmentedMesh,
     planes: &[usize],
     touches: &[ProbedPoint],
@@ -128,13 +132,17 @@ pub(super) fn axes(
 }
 
 /// Groups of connected contacts: no farther apart than `reach`, m.
-pub(super) fn together(touches: &[ProbedPoint], numbers: &[usize], reach: f64) -> Vec<Vec<usize>> {
+pub(in crate::features) fn together(
+    touches: &[ProbedPoint],
+    numbers: &[usize],
+    reach: f64,
+) -> Vec<Vec<usize>> {
     hanging(numbers, |at| touches[at].point, reach, |_, _| true)
 }
 
 /// Groups of connected contacts of walls along an axis, in the view along it: one wall, touched
 /// from above, below or both. Direct neighbours have like normals.
-pub(super) fn together_along(
+pub(in crate::features) fn together_along(
     touches: &[ProbedPoint],
     numbers: &[usize],
     axis: &Vector3<f64>,

@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use super::file_error::{FileError, read_up_to};
 use super::table_rows::{DecimalSign, RowError, TableRows};
+use crate::file_error::{FileError, read_up_to};
 
 /// Longest file: more than a hundred thousand rows.
 const MAX_BYTES: u64 = 16 << 20;
@@ -28,7 +28,7 @@ pub enum TableError {
 
 /// The columns of a table.
 #[derive(Clone, Copy)]
-pub(super) struct WantedColumns<'a> {
+pub(crate) struct WantedColumns<'a> {
     /// required numbers
     pub needed: &'a [&'a str],
     /// optional numbers
@@ -39,7 +39,7 @@ pub(super) struct WantedColumns<'a> {
 
 /// One row, its columns in the requested order.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Row {
+pub(crate) struct Row {
     /// its first line
     pub line: usize,
     /// finite
@@ -51,7 +51,7 @@ pub(super) struct Row {
 }
 
 /// All rows with a value.
-pub(super) fn read_table(path: &Path, columns: WantedColumns<'_>) -> Result<Vec<Row>, TableError> {
+pub(crate) fn read_table(path: &Path, columns: WantedColumns<'_>) -> Result<Vec<Row>, TableError> {
     let bytes = read_up_to(path, MAX_BYTES).map_err(|source| FileError::Read {
         path: path.to_owned(),
         source,

@@ -22,14 +22,14 @@ pub enum Bend {
 
 /// A sharp edge, or a sharp vertex as an edge without length.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Crease {
+pub(in crate::features) struct Crease {
     pub ends: [VertexId; 2],
     pub bend: Bend,
 }
 
 /// All creases of a mesh, in order of their faces; single vertices last.
 #[derive(Clone, Debug)]
-pub(super) struct Creases {
+pub(in crate::features) struct Creases {
     pub list: Vec<Crease>,
 }
 

@@ -7,7 +7,7 @@
 //! nothing else is measurable there, and scans are least accurate in corners.
 
 use crate::reconstruct::evidence::contact_map::ContactMap;
-use crate::reconstruct::field::piecewise::{FieldParams, FieldScratch, Piece};
+use crate::reconstruct::evidence::piecewise::{FieldParams, FieldScratch, Piece};
 
 /// Cosine of 60°: surfaces at less than that to each other let the ball in as far as the last
 /// contacts reach anyway, and at more than 120° they belong to a slot and meet nowhere near.

@@ -7,15 +7,15 @@ use nalgebra::{Point3, Vector3};
 
 use super::bodies::{Bodies, Surroundings};
 use super::facets::{Facets, NONE};
-use super::fit::Plane;
 use super::grow::MeshScale;
 use super::primitive::Primitive;
 use super::segment::{Segment, Segmentation};
+use crate::features::fit::Plane;
 use touchup_geometry::mesh::{FaceTree, TriMesh, VertexId};
 use touchup_geometry::numeric::tangent_basis;
 
 /// A segmented mesh.
-pub(super) struct SegmentedMesh<'a> {
+pub(in crate::features) struct SegmentedMesh<'a> {
     pub facets: Facets<'a>,
     pub tree: &'a FaceTree,
     pub bodies: Bodies,
@@ -40,7 +40,7 @@ const SQUARE: f64 = 0.94;
 /// The same surface with its faces in the order of their positions, from below, each from its first
 /// corner on, and its vertices in the order of the faces. Results that depend on the order of faces
 /// then depend on the surface alone.
-pub(super) fn numbered_by_place(mesh: &TriMesh) -> TriMesh {
+pub(in crate::features) fn numbered_by_place(mesh: &TriMesh) -> TriMesh {
     let place = |vertex: u32| mesh.position(VertexId(vertex));
     let order = |&a: &u32, &b: &u32| {
         let (a, b) = (place(a), place(b));

@@ -6,12 +6,12 @@ use touchup_geometry::mesh::{FaceId, TriMesh, VertexId};
 
 /// No face lies across this edge: the mesh ends, more than two faces meet, or the neighbour is
 /// turned over. For a face: no segment, no piece.
-pub(super) const NONE: u32 = u32::MAX;
+pub(in crate::features) const NONE: u32 = u32::MAX;
 
 /// All faces of a mesh, by id; each property has an array of its own, so that reading one does not
 /// load the others.
 #[derive(Clone, Debug)]
-pub(super) struct Facets<'a> {
+pub(in crate::features) struct Facets<'a> {
     pub mesh: &'a TriMesh,
     /// outward unit normals; zero for a face without area
     pub normals: Vec<Vector3<f64>>,

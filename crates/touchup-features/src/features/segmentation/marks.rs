@@ -1,7 +1,7 @@
 //! Sets of faces, or vertices: one bit for each.
 
 /// Numbers below a limit, each once.
-pub(super) struct NumberSet(Vec<u64>);
+pub(in crate::features) struct NumberSet(Vec<u64>);
 
 impl NumberSet {
     pub(crate) fn below(limit: usize) -> Self {
@@ -28,7 +28,7 @@ impl NumberSet {
 const FEW: usize = 64;
 
 /// Sorts distinct numbers below `limit`.
-pub(super) fn sort(numbers: &mut Vec<u32>, limit: usize) {
+pub(in crate::features) fn sort(numbers: &mut Vec<u32>, limit: usize) {
     if numbers.len() < limit / FEW {
         return numbers.sort_unstable();
     }

@@ -14,8 +14,8 @@ use serde_json::json;
 use tokio::sync::oneshot;
 use tokio::time::timeout;
 
-use super::report_request::{NominalSource, ReportRequest};
-use super::report_work::{NominalFile, ReportWork};
+use super::reporting::report_request::{NominalSource, ReportRequest};
+use super::reporting::report_work::{NominalFile, ReportWork};
 use crate::page::admission::access::Role;
 use crate::page::admission::entrance::{as_json, refusal};
 use crate::page::background::begin;
@@ -51,7 +51,7 @@ impl ReportRefusal {
 }
 
 /// Makes a report: `POST /api/reports/SESSION?…`, with uploaded nominal values in its body.
-pub(in crate::page) async fn make(
+pub(super) async fn make(
     State(site): State<Arc<Site>>,
     headers: HeaderMap,
     Path(session): Path<String>,
@@ -219,7 +219,7 @@ async fn save(site: &Site) -> Result<(), ReportRefusal> {
 }
 
 /// Serves a report: `GET /api/reports/SESSION`.
-pub(in crate::page) async fn show(
+pub(super) async fn show(
     State(site): State<Arc<Site>>,
     headers: HeaderMap,
     Path(session): Path<String>,

@@ -14,7 +14,7 @@ use touchup_geometry::numeric::median;
 
 /// Characteristic lengths of a mesh.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct MeshScale {
+pub(in crate::features) struct MeshScale {
     /// diagonal of the box around all, m
     pub diagonal: f64,
     /// median length of an edge, m
@@ -22,9 +22,9 @@ pub(super) struct MeshScale {
 }
 
 /// Rounding of coordinates in single precision, in diagonals.
-pub(super) const ROUNDING: f64 = 1e-6;
+pub(in crate::features) const ROUNDING: f64 = 1e-6;
 /// Minimum distance of facets from their surface that counts, in roundings of a file.
-pub(super) const SEEN_FACETS: f64 = 10.0;
+pub(in crate::features) const SEEN_FACETS: f64 = 10.0;
 /// Waves of an otherwise good surface, in median edges.
 const WAVES: f64 = 0.05;
 /// Maximum waves, in diagonals of the mesh.
@@ -72,7 +72,7 @@ const MOST_FITTED: usize = 300;
 
 impl Segmentation {
     /// Parts a mesh.
-    pub(super) fn of(facets: &Facets, scale: MeshScale) -> Self {
+    pub(in crate::features) fn of(facets: &Facets, scale: MeshScale) -> Self {
         let mut growing = RegionGrower::of(facets, scale);
         let mut seeds = growing.seeds();
         let mut flats = Flats::of(facets);
@@ -521,7 +521,7 @@ fn power_of_two(x: f64) -> usize {
 
 impl MeshScale {
     /// The edge is the median over a sample of the first edges of faces.
-    pub(super) fn of(facets: &Facets) -> Self {
+    pub(in crate::features) fn of(facets: &Facets) -> Self {
         let [lo, hi] = facets.mesh.bounds();
         let count = facets.slots();
         let sample = (0..count)
@@ -556,7 +556,7 @@ impl MeshScale {
     }
 
     /// Distance of a drawing's facets from a round surface with corners on its chords, m.
-    pub(super) fn chords(&self) -> f64 {
+    pub(in crate::features) fn chords(&self) -> f64 {
         WAVES_OF_ALL * self.diagonal
     }
 

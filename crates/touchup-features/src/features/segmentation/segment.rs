@@ -3,9 +3,9 @@
 use std::collections::BTreeSet;
 
 use super::facets::{Facets, NONE};
-use super::fit::SurfaceModel;
 use super::marks::sort;
 use super::primitive::{Primitive, belongs, plane_of};
+use crate::features::fit::SurfaceModel;
 use touchup_geometry::numeric::{DisjointSets, distinct};
 
 /// A connected piece of the mesh that one primitive explains.
@@ -36,7 +36,7 @@ pub(crate) struct Segmentation {
 
 impl Segmentation {
     /// Adds a segment, which takes its faces from others; returns its number.
-    pub(super) fn add(&mut self, facets: &Facets, mut segment: Segment) -> usize {
+    pub(in crate::features) fn add(&mut self, facets: &Facets, mut segment: Segment) -> usize {
         let number = self.segments.len() as u32;
         segment.faces.sort_unstable();
         let mut poorer = Vec::new();
@@ -61,7 +61,7 @@ impl Segmentation {
     /// planes of their own.
     ///
     /// - `tolerance`: distance of chords from the surface, m.
-    pub(super) fn join_chords(&mut self, facets: &Facets, tolerance: f64) {
+    pub(in crate::features) fn join_chords(&mut self, facets: &Facets, tolerance: f64) {
         for number in 0..self.segments.len() {
             let Segment {
                 primitive,
@@ -131,7 +131,11 @@ impl Segmentation {
     /// Merges planes that continue each other.
     ///
     /// - `beside`: pairs of adjacent segments, over seams too, the smaller number first.
-    pub(super) fn join_planes(&mut self, facets: &Facets, beside: impl Iterator<Item = [u32; 2]>) {
+    pub(in crate::features) fn join_planes(
+        &mut self,
+        facets: &Facets,
+        beside: impl Iterator<Item = [u32; 2]>,
+    ) {
         let mut sets = DisjointSets::of(self.segments.len());
         for pair in beside {
             let [a, b] = pair.map(|number| sets.root(number));

@@ -15,13 +15,13 @@ use super::contacts::{
     ALIKE, LEAST, ProjectedContact, SQUARE, TOGETHER, axes, is_on, large_planes, projected,
     thinned, together,
 };
-use super::facets::NONE;
-use super::fit::{Cylinder, FitParams, Plane, SurfaceModel, fit};
-use super::observe::{groups, observation};
-use super::primitive::{Primitive, belongs};
-use super::scene::SegmentedMesh;
-use super::segment::Segment;
-use super::walls::ALL_AROUND;
+use crate::features::fit::{Cylinder, FitParams, Plane, SurfaceModel, fit};
+use crate::features::observe::{groups, observation};
+use crate::features::segmentation::facets::NONE;
+use crate::features::segmentation::primitive::{Primitive, belongs};
+use crate::features::segmentation::scene::SegmentedMesh;
+use crate::features::segmentation::segment::Segment;
+use crate::features::walls::ALL_AROUND;
 use touchup_geometry::mesh::{BoxQuery, FaceId};
 use touchup_geometry::numeric::{distinct, mean, median, tangent_basis};
 use touchup_method::stylus::ProbedPoint;
@@ -103,7 +103,10 @@ struct ContactWalls {
 
 /// Adds the walls that contacts show to the segmentation, each with the faces of the mesh on it.
 /// Returns for each contact whether it is on a wall that is round all around.
-pub(super) fn add_contact_walls(parted: &mut SegmentedMesh, touches: &[ProbedPoint]) -> Vec<bool> {
+pub(in crate::features) fn add_contact_walls(
+    parted: &mut SegmentedMesh,
+    touches: &[ProbedPoint],
+) -> Vec<bool> {
     let radius = touches.iter().map(|touch| touch.radius).fold(0.0, f64::max);
     let ContactWalls { cylinders, planes } = contact_walls(parted, touches);
     let of_planes = planes.iter().map(|found| {

@@ -13,9 +13,9 @@ use super::contacts::{
     ALIKE, ProjectedContact, SQUARE, TOGETHER, axes, large_planes, projected, thinned,
     together_along,
 };
-use super::fit::Ends;
-use super::scene::SegmentedMesh;
-use super::slots::{LONG, LONG_BOX, SHALLOW, SQUARISH, Slot, WIDE};
+use crate::features::fit::Ends;
+use crate::features::segmentation::scene::SegmentedMesh;
+use crate::features::slots::{LONG, LONG_BOX, SHALLOW, SQUARISH, Slot, WIDE};
 use touchup_geometry::numeric::{
     distinct, median, order_statistic, tangent_basis, without_repeats,
 };
@@ -94,7 +94,7 @@ struct WallLine {
 /// All slots and pockets that contacts show.
 ///
 /// - `is_round`: by contact, whether it is on a wall that is round all around
-pub(super) fn contact_slots(
+pub(in crate::features) fn contact_slots(
     parted: &SegmentedMesh,
     touches: &[ProbedPoint],
     is_round: &[bool],
