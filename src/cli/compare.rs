@@ -149,7 +149,6 @@ pub(super) fn compare(arguments: &CompareArguments) -> Result<Losses, CliError> 
 }
 
 /// Compares, and writes the requested files.
-#[expect(clippy::too_many_lines)]
 pub(super) fn compared(arguments: &CompareArguments) -> Result<CompareReport, CliError> {
     arguments.check_alignment()?;
     arguments.check_outputs()?;
@@ -172,21 +171,7 @@ pub(super) fn compared(arguments: &CompareArguments) -> Result<CompareReport, Cl
     let truth = PlacedMesh::new(truth);
     drop(reading);
 
-    let (pose, alignment) = match arguments.align {
-        Align::None => (Isometry3::identity(), None),
-        Align::Icp => aligned_by_icp(&as_read, truth.shape(), arguments.seed)?,
-        Align::Features => {
-            let alternative = arguments.alternative.map(usize::from);
-            aligned_by_features(
-                &as_read,
-                truth.shape(),
-                arguments.seed,
-                alternative,
-                arguments.json,
-            )?
-        }
-        Align::Pairs => aligned_by_pairs(arguments.pairs()?)?,
-    };
+    let (pose, alignment) = arguments.aligned(&as_read, &truth)?;
     let mesh = PlacedMesh::new(moved(&as_read, &pose));
     let before = before.map(|scan| PlacedMesh::new(moved(&scan, &pose)));
     let (scanned, refined) =
@@ -211,21 +196,7 @@ pub(super) fn compared(arguments: &CompareArguments) -> Result<CompareReport, Cl
         )?;
     }
     if let Some(path) = &arguments.coloured {
-        let colours: Vec<_> = refined
-            .vertex_deviations
-            .iter()
-            .map(|&d| colour_of(d, refined.range))
-            .collect();
-        let in_mm: Vec<f32> = refined
-            .vertex_deviations
-            .iter()
-            .map(|d| (d * 1e3) as f32)
-            .collect();
-        let column = VertexColumn {
-            name: "deviation_mm",
-            values: in_mm.into(),
-        };
-        write_coloured(path, &as_read, arguments.mesh_unit, &colours, [column])?;
+        arguments.write_deviations(path, &as_read, &refined)?;
     }
     let shapes = [
         (&*arguments.mesh, &as_read),
@@ -259,6 +230,40 @@ impl CompareArguments {
             seed: 1,
             ..Self::default()
         }
+    }
+
+    /// Motion of the mesh onto the truth.
+    fn aligned(
+        &self,
+        mesh: &TriMesh,
+        truth: &PlacedMesh,
+    ) -> Result<(Isometry3<f64>, Option<AlignmentReport>), CliError> {
+        let alternative = self.alternative.map(usize::from);
+        match self.align {
+            Align::None => Ok((Isometry3::identity(), None)),
+            Align::Icp => aligned_by_icp(mesh, truth.shape(), self.seed),
+            Align::Features => {
+                aligned_by_features(mesh, truth.shape(), self.seed, alternative, self.json)
+            }
+            Align::Pairs => aligned_by_pairs(self.pairs()?),
+        }
+    }
+
+    /// Writes the mesh, coloured by deviation.
+    fn write_deviations(
+        &self,
+        path: &Path,
+        mesh: &TriMesh,
+        found: &Comparison,
+    ) -> Result<(), CliError> {
+        let deviations = || found.vertex_deviations.iter();
+        let colours: Vec<_> = deviations().map(|&d| colour_of(d, found.range)).collect();
+        let in_mm: Vec<f32> = deviations().map(|d| (d * 1e3) as f32).collect();
+        let column = VertexColumn {
+            name: "deviation_mm",
+            values: in_mm.into(),
+        };
+        write_coloured(path, mesh, self.mesh_unit, &colours, [column])
     }
 
     /// Compares the scan before, if any, and the mesh, in one range.

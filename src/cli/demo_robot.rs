@@ -20,6 +20,7 @@ use super::probing::{Probing, ProbingOutcome, ProbingSetup, ProbingSummary};
 use super::{CliError, Losses, not_written, print_result, reported, write_json};
 use touchup_features::calibrate::ReferenceSphere;
 use touchup_features::features::{Feature, InspectedQuantity};
+use touchup_geometry::mesh::TriMesh;
 use touchup_io::atomic::{create_folder, write_atomically};
 use touchup_io::features_file::FeatureRecord;
 use touchup_io::mesh_file::{MeshUnit, write_mesh};
@@ -113,23 +114,12 @@ impl NumberError {
 }
 
 /// - `seed`: for scan, clicks and arm.
-#[expect(clippy::too_many_lines)]
 pub(super) fn demo_robot(out: &Path, seed: u64) -> Result<Losses, CliError> {
     let plate = Plate::default();
     create_folder(out).map_err(not_written(out))?;
     let [truth_path, scan_path, scene_path] =
         ["truth.ply", "scan.ply", "scene.yaml"].map(|name| out.join(name));
-    let truth = plate.mesh(CHORD_ERROR)?;
-    let scanning = WorkProgress::stage("scan");
-    let scanner = ScannerParams {
-        seed,
-        ..ScannerParams::default()
-    };
-    let scanned = scan(&plate, &scanner)?;
-    drop(scanning);
-    for (path, mesh) in [(&truth_path, &truth), (&scan_path, &scanned)] {
-        write_mesh(path, mesh, MeshUnit::Millimetre).map_err(CliError::not_written)?;
-    }
+    let truth = write_part(&plate, [&truth_path, &scan_path], seed)?;
     let scene = SCENE.replace(PERFECT, CALIBRATED);
     let write_scene = |text: &str| {
         write_atomically(&scene_path, |file| file.write_all(text.as_bytes()))
@@ -139,11 +129,7 @@ pub(super) fn demo_robot(out: &Path, seed: u64) -> Result<Losses, CliError> {
     write_scene(&scene.replace(CHECK, ""))?;
 
     let features = plate.features();
-    let mut rng = Pcg64::seed_from_u64(seed);
-    let flags: Vec<Flag> = (1..)
-        .zip(&features)
-        .map(|(id, feature)| clicked(id, feature, &mut rng))
-        .collect();
+    let flags = clicks(&features, seed);
     let probing = Probing {
         scene: &scene_path,
         scan: &scan_path,
@@ -163,11 +149,8 @@ pub(super) fn demo_robot(out: &Path, seed: u64) -> Result<Losses, CliError> {
         part: &plate,
         spheres: &spheres,
     };
-    let mut arm = SimArm::new(
-        &around,
-        unchecked.simulated_arm(seed, ArmErrorsName::Calibrated),
-        &start,
-    )?;
+    let errors = unchecked.simulated_arm(seed, ArmErrorsName::Calibrated);
+    let mut arm = SimArm::new(&around, errors, &start)?;
     let check = checked(&unchecked, &mut arm)?;
     write_json(&out.join("check.json"), &check)?;
     write_scene(&scene)?;
@@ -185,20 +168,11 @@ pub(super) fn demo_robot(out: &Path, seed: u64) -> Result<Losses, CliError> {
         return outcome;
     }
 
-    let named = probed
-        .iter()
-        .filter_map(feature_of)
-        .map(FeatureRecord::of)
-        .collect();
-    compared(&CompareArguments::in_folder(out, named))?;
-    let errors = flags.iter().zip(&features).map(|(flag, truth)| {
-        let probed = probed.iter().find(|probed| probed.flag == flag.id);
-        ProbedError::of(flag, truth, probed, probed.and_then(feature_of))
-    });
+    compare_refined(out, &probed)?;
     let demo = RobotSummary {
         check,
         probing: summary,
-        errors: errors.collect(),
+        errors: errors_of(&flags, &features, &probed),
     };
     write_json(&out.join("summary.json"), &demo)?;
     print_result(&format!(
@@ -206,6 +180,50 @@ pub(super) fn demo_robot(out: &Path, seed: u64) -> Result<Losses, CliError> {
         out.display()
     ))?;
     outcome
+}
+
+/// Writes the mesh of the part, and its scan; returns the mesh.
+fn write_part(
+    plate: &Plate,
+    [truth_path, scan_path]: [&Path; 2],
+    seed: u64,
+) -> Result<TriMesh, CliError> {
+    let truth = plate.mesh(CHORD_ERROR)?;
+    let scanning = WorkProgress::stage("scan");
+    let scanner = ScannerParams {
+        seed,
+        ..ScannerParams::default()
+    };
+    let scanned = scan(plate, &scanner)?;
+    drop(scanning);
+    for (path, mesh) in [(truth_path, &truth), (scan_path, &scanned)] {
+        write_mesh(path, mesh, MeshUnit::Millimetre).map_err(CliError::not_written)?;
+    }
+    Ok(truth)
+}
+
+/// A click near each feature.
+fn clicks(features: &[TruthFeature], seed: u64) -> Vec<Flag> {
+    let mut rng = Pcg64::seed_from_u64(seed);
+    (1..)
+        .zip(features)
+        .map(|(id, feature)| clicked(id, feature, &mut rng))
+        .collect()
+}
+
+/// Compares the refined mesh with the part.
+fn compare_refined(out: &Path, probed: &[FlagResult]) -> Result<(), CliError> {
+    let named = probed.iter().filter_map(feature_of);
+    let named = named.map(FeatureRecord::of).collect();
+    compared(&CompareArguments::in_folder(out, named)).map(drop)
+}
+
+fn errors_of(flags: &[Flag], features: &[TruthFeature], probed: &[FlagResult]) -> Vec<ProbedError> {
+    let errors = flags.iter().zip(features).map(|(flag, truth)| {
+        let probed = probed.iter().find(|probed| probed.flag == flag.id);
+        ProbedError::of(flag, truth, probed, probed.and_then(feature_of))
+    });
+    errors.collect()
 }
 
 /// Touches the spot and all spheres.

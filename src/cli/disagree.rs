@@ -263,8 +263,17 @@ impl DisagreeArguments {
 const MOST_LISTED: usize = 12;
 
 impl fmt::Display for DisagreeReport {
-    #[expect(clippy::too_many_lines)]
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.write_scanner(f)?;
+        self.write_classes(f)?;
+        self.write_regions(f)?;
+        self.write_bad_touches(f)
+    }
+}
+
+impl DisagreeReport {
+    /// Writes the errors of the scanner and the offset of the whole scan.
+    fn write_scanner(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.scanner {
             Some(ScannerReport {
                 offset_mm,
@@ -297,6 +306,10 @@ impl fmt::Display for DisagreeReport {
                 "the scan as a whole lies off by ({x:.3}, {y:.3}, {z:.3}) mm and {turn:.3}°, which is taken off"
             )?;
         }
+        Ok(())
+    }
+
+    fn write_classes(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
             "{:<14} {:>12} {:>12}",
@@ -311,6 +324,10 @@ impl fmt::Display for DisagreeReport {
         {
             write!(f, "\n{class:<14} {refined_mm2:>12.1} {scan_mm2:>12.1}")?;
         }
+        Ok(())
+    }
+
+    fn write_regions(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if !self.regions.is_empty() {
             write!(
                 f,
@@ -340,7 +357,10 @@ impl fmt::Display for DisagreeReport {
                 region.edge_share_of_rim * 100.0
             )?;
         }
-        more(f, self.regions.len(), ["region", "regions"])?;
+        more(f, self.regions.len(), ["region", "regions"])
+    }
+
+    fn write_bad_touches(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for bad in self.bad_touches.iter().take(MOST_LISTED) {
             let ([x, y, z], touches) = (
                 bad.center_mm,

@@ -157,23 +157,11 @@ impl RefineArguments {
 
     /// Remaining refinement after the page closes: its session, without strokes undone there.
     #[cfg(any(feature = "ros", feature = "r2r"))]
-    #[expect(clippy::too_many_lines)]
     fn after_the_page(self) -> Result<Self, CliError> {
         if !self.web.is_wanted() {
             return Ok(self);
         }
-        require(
-            self.live,
-            "--web shows what is replayed in real time: say --live as well",
-        )?;
-        require(
-            self.mode.is_none_or(|mode| mode == Mode::Robust),
-            "--web shows the robust method alone",
-        )?;
-        require(
-            self.strokes.is_empty(),
-            "--web begins a session: resume the other one without it",
-        )?;
+        self.check_page()?;
         let (scene, _) = self.scene()?;
         self.check_out()?;
         let markers = marker_filter(&scene, self.recorded.markers_topic.as_deref())?;
@@ -227,6 +215,23 @@ impl RefineArguments {
             ..session
         }
         .completed()
+    }
+
+    /// Checks the flags against those of the page.
+    #[cfg(any(feature = "ros", feature = "r2r"))]
+    fn check_page(&self) -> Result<(), CliError> {
+        require(
+            self.live,
+            "--web shows what is replayed in real time: say --live as well",
+        )?;
+        require(
+            self.mode.is_none_or(|mode| mode == Mode::Robust),
+            "--web shows the robust method alone",
+        )?;
+        require(
+            self.strokes.is_empty(),
+            "--web begins a session: resume the other one without it",
+        )
     }
 
     /// Reads, replays and writes.

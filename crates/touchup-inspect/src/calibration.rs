@@ -94,7 +94,6 @@ fn of_touches(touches: &[ProbedPoint]) -> Vec<CalibrationLine> {
     ]
 }
 
-#[expect(clippy::too_many_lines)]
 fn of_scene(path: &Path, scene: &Scene, yaml: &str) -> Vec<CalibrationLine> {
     let named = |section: &str, key: &str| Scene::names(yaml, section, key);
     let in_scene = |is_named: bool| {
@@ -140,24 +139,25 @@ fn of_scene(path: &Path, scene: &Scene, yaml: &str) -> Vec<CalibrationLine> {
         ),
         line("scene file", "last changed", changed(path)),
     ];
-    let record = scene
-        .robot
-        .as_ref()
-        .and_then(|robot| robot.check_record.as_ref());
-    match record {
+    lines.extend(arm_check(scene));
+    lines
+}
+
+/// Check of the arm; `None` without an arm.
+fn arm_check(scene: &Scene) -> Option<CalibrationLine> {
+    let robot = scene.robot.as_ref()?;
+    let (found, date) = match &robot.check_record {
         Some(check) => {
             let verdict = if check.passed { "passed" } else { "failed" };
             let found = format!("{verdict}, repeatability {:.4} mm", check.repeatability_mm);
-            lines.push(line("check of the arm", found, age(check.date)));
+            (found, age(check.date))
         }
-        None if scene.robot.is_some() => lines.push(line(
-            "check of the arm",
-            NOT_STATED,
-            "the scene names no record (robot.check)",
-        )),
-        None => {}
-    }
-    lines
+        None => (
+            NOT_STATED.to_owned(),
+            "the scene names no record (robot.check)".to_owned(),
+        ),
+    };
+    Some(line("check of the arm", found, date))
 }
 
 fn changed(path: &Path) -> String {

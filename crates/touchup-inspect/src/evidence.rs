@@ -15,6 +15,9 @@ const MOST_DRAWN: usize = 300;
 /// Cosine of 45°: a normal nearer to the axis belongs to a floor, any other to a wall.
 const HALF_WAY: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
+/// Coordinate of touches without one on their surface.
+const IN_TIME: &str = "touch, in order of time";
+
 /// Touches on a surface.
 pub(super) struct TouchEvidence {
     /// reference of the distances
@@ -34,7 +37,6 @@ pub(super) struct TouchEvidence {
 
 /// Distances of the touches behind a quantity from their fitted surface; `None` if the file lacks
 /// that surface.
-#[expect(clippy::too_many_lines)]
 pub(super) fn touch_evidence(
     quantity: InspectedQuantity,
     feature: &FeatureRecord,
@@ -54,77 +56,32 @@ pub(super) fn touch_evidence(
     if all.is_empty() {
         return None;
     }
-    let seat = |touch: &ProbedPoint| touch.point * 1e3 - centre;
-    let order = |at: usize| at as f64;
-    let (ideal, along, places): (_, _, Vec<[f64; 2]>) =
-        match (quantity, feature.diameter_mm, feature.width_mm) {
-            (InspectedQuantity::Depth, ..) => {
-                let depth = feature.depth_mm?;
-                let level = if matches!(&*feature.kind, "boss" | "cylinder") {
-                    depth
-                } else {
-                    -depth
-                };
-                let seats: Vec<_> = all.iter().map(|touch| seat(touch)).collect();
-                let offs = off_two_planes(&seats, &axis, level);
-                (
-                    "a plane at either end",
-                    "touch, in order of time",
-                    offs.into_iter()
-                        .enumerate()
-                        .map(|(at, off)| [order(at), off])
-                        .collect(),
-                )
-            }
-            (_, Some(diameter), _) => {
-                let [u, v] = across(&axis);
-                let place = |touch: &&ProbedPoint| {
-                    let off = seat(touch);
-                    let [x, y] = [off.dot(&u), off.dot(&v)];
-                    [y.atan2(x).to_degrees(), x.hypot(y) - diameter / 2.0]
-                };
-                (
-                    "the fitted cylinder",
-                    "angle about the axis, °",
-                    all.iter().map(place).collect(),
-                )
-            }
-            (_, None, Some(width)) => {
-                let length = feature.length_mm?;
-                let u = Vector3::from(feature.direction?);
-                let v = axis.cross(&u);
-                let is_slot = feature.kind == "slot";
-                let place = |touch: &&ProbedPoint| {
-                    let off = seat(touch);
-                    let [x, y] = [off.dot(&u), off.dot(&v)];
-                    let round = x - x.clamp(-(length - width) / 2.0, (length - width) / 2.0);
-                    let (side, end) = (y.abs() - width / 2.0, x.abs() - length / 2.0);
-                    let straight = if side.abs() < end.abs() { side } else { end };
-                    [
-                        x,
-                        if is_slot {
-                            round.hypot(y) - width / 2.0
-                        } else {
-                            straight
-                        },
-                    ]
-                };
-                (
-                    "the fitted walls",
-                    "along the slot, mm",
-                    all.iter().map(place).collect(),
-                )
-            }
-            _ if feature.kind == "plane" => {
-                let places = all
-                    .iter()
-                    .enumerate()
-                    .map(|(at, touch)| [order(at), seat(touch).dot(&axis)])
-                    .collect();
-                ("the fitted plane", "touch, in order of time", places)
-            }
-            _ => return None,
-        };
+    let seats: Vec<_> = all.iter().map(|touch| touch.point * 1e3 - centre).collect();
+    let (ideal, along, places) = match (quantity, feature.diameter_mm, feature.width_mm) {
+        (InspectedQuantity::Depth, ..) => {
+            let depth = feature.depth_mm?;
+            let level = if matches!(&*feature.kind, "boss" | "cylinder") {
+                depth
+            } else {
+                -depth
+            };
+            let offs = off_two_planes(&seats, &axis, level);
+            ("a plane at either end", IN_TIME, numbered(offs))
+        }
+        (_, Some(diameter), _) => {
+            let places = off_cylinder(&seats, &axis, diameter);
+            ("the fitted cylinder", "angle about the axis, °", places)
+        }
+        (_, None, Some(width)) => {
+            let places = off_walls(&seats, &axis, width, feature)?;
+            ("the fitted walls", "along the slot, mm", places)
+        }
+        _ if feature.kind == "plane" => {
+            let offs = seats.iter().map(|seat| seat.dot(&axis));
+            ("the fitted plane", IN_TIME, numbered(offs))
+        }
+        _ => return None,
+    };
     let mean_square = |values: &mut dyn Iterator<Item = f64>| {
         values.map(|x| x * x).sum::<f64>() / all.len() as f64
     };
@@ -141,6 +98,45 @@ pub(super) fn touch_evidence(
             .copied()
             .collect(),
     })
+}
+
+/// Distances after their numbers in order of time.
+fn numbered(offs: impl IntoIterator<Item = f64>) -> Vec<[f64; 2]> {
+    let offs = offs.into_iter().enumerate();
+    offs.map(|(at, off)| [at as f64, off]).collect()
+}
+
+/// Angle of each point about the axis, degrees, and its distance from a cylinder, mm.
+fn off_cylinder(seats: &[Vector3<f64>], axis: &Vector3<f64>, diameter: f64) -> Vec<[f64; 2]> {
+    let [u, v] = across(axis);
+    let place = |seat: &Vector3<f64>| {
+        let [x, y] = [seat.dot(&u), seat.dot(&v)];
+        [y.atan2(x).to_degrees(), x.hypot(y) - diameter / 2.0]
+    };
+    seats.iter().map(place).collect()
+}
+
+/// Place of each point along a slot, pocket or notch, and its distance from the nearest wall, mm;
+/// `None` if the file lacks length or direction.
+fn off_walls(
+    seats: &[Vector3<f64>],
+    axis: &Vector3<f64>,
+    width: f64,
+    feature: &FeatureRecord,
+) -> Option<Vec<[f64; 2]>> {
+    let length = feature.length_mm?;
+    let u = Vector3::from(feature.direction?);
+    let v = axis.cross(&u);
+    let place = |seat: &Vector3<f64>| {
+        let [x, y] = [seat.dot(&u), seat.dot(&v)];
+        if feature.kind == "slot" {
+            let round = x - x.clamp(-(length - width) / 2.0, (length - width) / 2.0);
+            return [x, round.hypot(y) - width / 2.0];
+        }
+        let (side, end) = (y.abs() - width / 2.0, x.abs() - length / 2.0);
+        [x, if side.abs() < end.abs() { side } else { end }]
+    };
+    Some(seats.iter().map(place).collect())
 }
 
 /// Distance of each point along the axis from the least-squares plane through the points of its

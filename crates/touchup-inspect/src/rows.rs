@@ -14,8 +14,8 @@ use super::source::InspectionSource;
 use super::words::first_few;
 use super::{InspectionError, InspectionParams};
 use touchup_features::conformity::{
-    Assessment, Decision, FeatureMatch, FeaturePlace, SoughtFeature, ToleranceLimits, assess,
-    match_features,
+    Assessment, Decision, DecisionParams, FeatureMatch, FeaturePlace, MeasuredNumber,
+    SoughtFeature, ToleranceLimits, assess, match_features,
 };
 use touchup_features::features::InspectedQuantity;
 use touchup_io::features_file::{FeatureFile, FeatureRecord};
@@ -78,9 +78,18 @@ pub fn inspected(
         let feature = found_feature(matched, &source.features);
         for (index, &at) in (1..).zip(group) {
             let place = format!("{number}.{index}");
-            let (record, behind) =
-                characteristic(&drawn[at], place, matched, &found.datums[at], file, params);
-            (characteristics[at], runs[at]) = (record, behind);
+            let matched = MatchedCharacteristic {
+                drawn: &drawn[at],
+                feature_match: matched,
+                datum_match: found.datums[at].as_ref(),
+                feature: found_feature(matched, file),
+                datum: found.datums[at]
+                    .as_ref()
+                    .and_then(|datum| found_feature(datum, file)),
+            };
+            let measured = matched.measured(file, params.align.is_some());
+            characteristics[at] = matched.record(place, &measured, params);
+            runs[at] = measured.runs;
         }
         balloons.push(Balloon {
             number,
@@ -250,123 +259,134 @@ fn why_not(
     }
 }
 
-#[expect(clippy::too_many_lines)]
-fn characteristic(
-    drawn: &DrawnCharacteristic,
-    number: String,
-    matched: &FeatureMatch,
-    datum: &Option<FeatureMatch>,
-    file: &FeatureFile,
-    params: &InspectionParams,
-) -> (CharacteristicRecord, Vec<[u32; 2]>) {
-    let DrawnCharacteristic {
-        nominal,
-        quantity,
-        limits,
-        from,
-        facets_mm,
-    } = drawn;
-    let feature = found_feature(matched, file);
-    let datum_feature = datum.as_ref().and_then(|datum| found_feature(datum, file));
-    let measured = match (feature, datum, datum_feature) {
-        (None, ..) => CharacteristicMeasurement::none(why_not(
-            matched,
-            &nominal.kind,
-            nominal,
-            params.align.is_some(),
-        )),
-        (Some(_), Some(datum), None) => {
-            let record = nominal.datum.clone().unwrap_or_default();
-            let as_nominal = NominalRecord {
-                center_mm: record.center_mm,
-                feature: record.feature,
-                ..NominalRecord::default()
-            };
-            CharacteristicMeasurement::none(format!(
-                "datum: {}",
-                why_not(datum, &record.kind, &as_nominal, params.align.is_some())
-            ))
-        }
-        (Some(feature), ..) => {
-            let kind = nominal.kind().unwrap_or_default();
-            measurement(
+/// A characteristic of the drawing with its features in the measurement.
+struct MatchedCharacteristic<'a> {
+    drawn: &'a DrawnCharacteristic,
+    feature_match: &'a FeatureMatch,
+    datum_match: Option<&'a FeatureMatch>,
+    feature: Option<&'a FeatureRecord>,
+    datum: Option<&'a FeatureRecord>,
+}
+
+impl MatchedCharacteristic<'_> {
+    fn measured(&self, file: &FeatureFile, is_aligned: bool) -> CharacteristicMeasurement {
+        let nominal = &self.drawn.nominal;
+        match (self.feature, self.datum_match, self.datum) {
+            (None, ..) => CharacteristicMeasurement::none(why_not(
+                self.feature_match,
+                &nominal.kind,
+                nominal,
+                is_aligned,
+            )),
+            (Some(_), Some(datum), None) => {
+                let record = nominal.datum.clone().unwrap_or_default();
+                let as_nominal = NominalRecord {
+                    center_mm: record.center_mm,
+                    feature: record.feature,
+                    ..NominalRecord::default()
+                };
+                let why = why_not(datum, &record.kind, &as_nominal, is_aligned);
+                CharacteristicMeasurement::none(format!("datum: {why}"))
+            }
+            (Some(feature), ..) => measurement(
                 file,
                 feature,
-                kind,
-                *quantity,
+                nominal.kind().unwrap_or_default(),
+                self.drawn.quantity,
                 nominal.center_mm,
-                datum_feature,
-            )
+                self.datum,
+            ),
         }
-    };
-    let untouched = [feature, datum_feature]
-        .into_iter()
-        .flatten()
-        .find(|feature| is_of_mesh(feature));
-    let assessed = |limits| match &measured.number {
-        Some(number) if untouched.is_none() => {
-            assess(number, limits, quantity.distribution(), &params.decision)
-        }
-        _ => Assessment::default(),
-    };
-    let of_facets = ToleranceLimits {
-        lower: limits.lower.map(|lower| lower - facets_mm),
-        ..*limits
-    };
-    let (mut assessment, as_facets) = (assessed(*limits), assessed(of_facets));
-    let mut why = match untouched {
-        Some(feature) => Some(missing_touches(feature, *quantity)),
-        None => assessment.reason.map(|reason| reason.to_string()),
-    };
-    if assessment.decision == Decision::Fail && as_facets.decision != Decision::Fail {
-        (assessment.decision, assessment.rejection) = (Decision::Undecided, as_facets.rejection);
-        why = Some(format!(
-            "a part made as the facets of the CAD mesh measures up to {facets_mm:.3} mm less: take a finer mesh, or the number of the drawing"
-        ));
     }
-    let mut record = CharacteristicRecord {
-        number,
-        name: nominal.name.clone(),
-        kind: nominal.kind.clone(),
-        feature: feature.map(|feature| feature.id),
-        datum: datum_feature.map(|datum| datum.id),
-        quantity: quantity.name().to_owned(),
-        is_at_least: measured.number.is_some_and(|number| number.is_at_least),
-        tolerance_from: from.clone(),
-        decision: assessment.decision.name().to_owned(),
-        reason: measured.why_none.or(why),
-        conformance_probability: assessment.conformance_probability,
-        risk: assessment.risk(),
-        touches: measured
-            .runs
-            .iter()
-            .map(|[first, last]| (last - first + 1) as usize)
-            .sum(),
-        fitted_to: feature.map_or(String::new(), |feature| feature.fitted_to.clone()),
-        ..CharacteristicRecord::default()
-    };
-    let std = measured.number.and_then(|number| number.std);
-    let actual = measured.number.map(|number| number.value);
-    let numbers = [
-        ("nominal", Some(nominal.nominal())),
-        ("lower_limit", limits.lower),
-        ("upper_limit", limits.upper),
-        ("actual", actual),
-        ("deviation", actual.map(|actual| actual - nominal.nominal())),
-        ("standard_uncertainty", std),
-        (
-            "expanded_uncertainty",
-            std.map(|std| std * params.coverage_factor),
-        ),
-        ("acceptance_lower", assessment.acceptance.lower),
-        ("acceptance_upper", assessment.acceptance.upper),
-        ("rejection_lower", assessment.rejection.lower),
-        ("rejection_upper", assessment.rejection.upper),
-    ];
-    numbers
-        .into_iter()
-        .for_each(|(name, number)| record.set(name, number));
-    (record, measured.runs)
+
+    /// Decision on a measured number, and its reason.
+    fn assessed(
+        &self,
+        number: Option<MeasuredNumber>,
+        decision: &DecisionParams,
+    ) -> (Assessment, Option<String>) {
+        let (quantity, limits) = (self.drawn.quantity, self.drawn.limits);
+        let facets_mm = self.drawn.facets_mm;
+        let untouched = [self.feature, self.datum]
+            .into_iter()
+            .flatten()
+            .find(|feature| is_of_mesh(feature));
+        let assessed = |limits| match &number {
+            Some(number) if untouched.is_none() => {
+                assess(number, limits, quantity.distribution(), decision)
+            }
+            _ => Assessment::default(),
+        };
+        let of_facets = ToleranceLimits {
+            lower: limits.lower.map(|lower| lower - facets_mm),
+            ..limits
+        };
+        let (mut assessment, as_facets) = (assessed(limits), assessed(of_facets));
+        let mut why = match untouched {
+            Some(feature) => Some(missing_touches(feature, quantity)),
+            None => assessment.reason.map(|reason| reason.to_string()),
+        };
+        if assessment.decision == Decision::Fail && as_facets.decision != Decision::Fail {
+            (assessment.decision, assessment.rejection) =
+                (Decision::Undecided, as_facets.rejection);
+            why = Some(format!(
+                "a part made as the facets of the CAD mesh measures up to {facets_mm:.3} mm less: take a finer mesh, or the number of the drawing"
+            ));
+        }
+        (assessment, why)
+    }
+
+    fn record(
+        &self,
+        number: String,
+        measured: &CharacteristicMeasurement,
+        params: &InspectionParams,
+    ) -> CharacteristicRecord {
+        let (drawn, nominal) = (self.drawn, &self.drawn.nominal);
+        let (assessment, why) = self.assessed(measured.number, &params.decision);
+        let mut record = CharacteristicRecord {
+            number,
+            name: nominal.name.clone(),
+            kind: nominal.kind.clone(),
+            feature: self.feature.map(|feature| feature.id),
+            datum: self.datum.map(|datum| datum.id),
+            quantity: drawn.quantity.name().to_owned(),
+            is_at_least: measured.number.is_some_and(|number| number.is_at_least),
+            tolerance_from: drawn.from.clone(),
+            decision: assessment.decision.name().to_owned(),
+            reason: measured.why_none.clone().or(why),
+            conformance_probability: assessment.conformance_probability,
+            risk: assessment.risk(),
+            touches: measured
+                .runs
+                .iter()
+                .map(|[first, last]| (last - first + 1) as usize)
+                .sum(),
+            fitted_to: self
+                .feature
+                .map_or(String::new(), |feature| feature.fitted_to.clone()),
+            ..CharacteristicRecord::default()
+        };
+        let std = measured.number.and_then(|number| number.std);
+        let actual = measured.number.map(|number| number.value);
+        let expanded = std.map(|std| std * params.coverage_factor);
+        for (name, number) in [
+            ("nominal", Some(nominal.nominal())),
+            ("lower_limit", drawn.limits.lower),
+            ("upper_limit", drawn.limits.upper),
+            ("actual", actual),
+            ("deviation", actual.map(|actual| actual - nominal.nominal())),
+            ("standard_uncertainty", std),
+            ("expanded_uncertainty", expanded),
+            ("acceptance_lower", assessment.acceptance.lower),
+            ("acceptance_upper", assessment.acceptance.upper),
+            ("rejection_lower", assessment.rejection.lower),
+            ("rejection_upper", assessment.rejection.upper),
+        ] {
+            record.set(name, number);
+        }
+        record
+    }
 }
 
 /// Kinds that usually have a characteristic in a drawing.

@@ -44,7 +44,6 @@ fn ids(at: usize) -> Ids {
     }
 }
 
-#[expect(clippy::too_many_lines)]
 fn document(record: &InspectionRecord) -> String {
     let all = &record.characteristics;
     let each = |aspect: fn(&CharacteristicRecord, &Ids) -> String| {
@@ -54,6 +53,43 @@ fn document(record: &InspectionRecord) -> String {
             .collect::<String>()
     };
     let (count, last) = (all.len(), ids(all.len()).definition - 1);
+    format!(
+        r#"<?xml version="1.0" encoding="UTF-8"?>
+<QIFDocument xmlns="http://qifstandards.org/xsd/qif3" xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance" xsi:schemaLocation="http://qifstandards.org/xsd/qif3 QIFApplications/QIFDocument.xsd" versionQIF="3.0.0" idMax="{last}">
+<QPId>{id}</QPId>
+<Version><TimeCreated>{date}</TimeCreated></Version>
+<Header><Application><Name>{program}</Name></Application></Header>
+<StandardsDefinitions n="1">
+<Standard id="{STANDARD}"><Organization><StandardsOrganizationEnum>ISO</StandardsOrganizationEnum></Organization><Designator>1101:2017</Designator></Standard>
+</StandardsDefinitions>
+<FileUnits><PrimaryUnits>
+<AngularUnit><SIUnitName>radian</SIUnitName><UnitName>degree</UnitName><UnitConversion><Factor>0.017453292519943295</Factor></UnitConversion></AngularUnit>
+<LinearUnit><SIUnitName>meter</SIUnitName><UnitName>mm</UnitName><UnitConversion><Factor>0.001</Factor></UnitConversion></LinearUnit>
+</PrimaryUnits></FileUnits>
+<Characteristics>
+<FormalStandardId>{STANDARD}</FormalStandardId>
+<CharacteristicDefinitions n="{count}">
+{definitions}</CharacteristicDefinitions>
+<CharacteristicNominals n="{count}">
+{nominals}</CharacteristicNominals>
+<CharacteristicItems n="{count}">
+{items}</CharacteristicItems>
+</Characteristics>
+{results}</QIFDocument>
+"#,
+        id = document_id(record),
+        date = escaped(&record.date),
+        program = escaped(&record.program),
+        definitions = each(definition),
+        nominals = each(nominal),
+        items = each(item),
+        results = results(record, &each(measurement)),
+    )
+}
+
+/// Results and status of the part.
+fn results(record: &InspectionRecord, measurements: &str) -> String {
+    let count = record.characteristics.len();
     let status = match &*record.verdict {
         "pass" => "PASS",
         "fail" => "FAIL",
@@ -80,29 +116,9 @@ fn document(record: &InspectionRecord) -> String {
     let serial = record.serial.as_ref().map_or(String::new(), |serial| {
         format!("<SerialNumber>{}</SerialNumber>", escaped(serial))
     });
+    let of_results = attributes(of_results.into_iter().flatten());
     format!(
-        r#"<?xml version="1.0" encoding="UTF-8"?>
-<QIFDocument xmlns="http://qifstandards.org/xsd/qif3" xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance" xsi:schemaLocation="http://qifstandards.org/xsd/qif3 QIFApplications/QIFDocument.xsd" versionQIF="3.0.0" idMax="{last}">
-<QPId>{id}</QPId>
-<Version><TimeCreated>{date}</TimeCreated></Version>
-<Header><Application><Name>{program}</Name></Application></Header>
-<StandardsDefinitions n="1">
-<Standard id="{STANDARD}"><Organization><StandardsOrganizationEnum>ISO</StandardsOrganizationEnum></Organization><Designator>1101:2017</Designator></Standard>
-</StandardsDefinitions>
-<FileUnits><PrimaryUnits>
-<AngularUnit><SIUnitName>radian</SIUnitName><UnitName>degree</UnitName><UnitConversion><Factor>0.017453292519943295</Factor></UnitConversion></AngularUnit>
-<LinearUnit><SIUnitName>meter</SIUnitName><UnitName>mm</UnitName><UnitConversion><Factor>0.001</Factor></UnitConversion></LinearUnit>
-</PrimaryUnits></FileUnits>
-<Characteristics>
-<FormalStandardId>{STANDARD}</FormalStandardId>
-<CharacteristicDefinitions n="{count}">
-{definitions}</CharacteristicDefinitions>
-<CharacteristicNominals n="{count}">
-{nominals}</CharacteristicNominals>
-<CharacteristicItems n="{count}">
-{items}</CharacteristicItems>
-</Characteristics>
-<Results>
+        r#"<Results>
 <MeasurementResultsSet n="1">
 <MeasurementResults id="{RESULTS}">
 {of_results}<MeasuredCharacteristics>
@@ -117,16 +133,7 @@ fn document(record: &InspectionRecord) -> String {
 <ActualComponent id="{COMPONENT}">{of_component}{serial}<Status><InspectionStatusEnum>{status}</InspectionStatusEnum></Status></ActualComponent>
 </ActualComponentSet></ActualComponentSets>
 </Results>
-</QIFDocument>
-"#,
-        id = document_id(record),
-        date = escaped(&record.date),
-        program = escaped(&record.program),
-        definitions = each(definition),
-        nominals = each(nominal),
-        items = each(item),
-        measurements = each(measurement),
-        of_results = attributes(of_results.into_iter().flatten()),
+"#
     )
 }
 

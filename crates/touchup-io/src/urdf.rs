@@ -124,7 +124,6 @@ pub fn read_urdf(path: &Path, links: &ArmLinks<'_>) -> Result<SerialChain, UrdfE
 /// The arm of a text.
 ///
 /// - `name`: of its file.
-#[expect(clippy::too_many_lines)]
 fn chain_of(text: &str, name: &str, links: &ArmLinks<'_>) -> Result<SerialChain, DescriptionError> {
     let document = Document::parse(text)?;
     let robot = document.root_element();
@@ -135,50 +134,23 @@ fn chain_of(text: &str, name: &str, links: &ArmLinks<'_>) -> Result<SerialChain,
     {
         return Err(DescriptionError::Xacro(name.to_owned()));
     }
-    let named = |tag: &'static str| move |node: &Node<'_, '_>| node.has_tag_name(tag);
-    let link_of = |name: &str| {
-        robot
-            .children()
-            .filter(named("link"))
-            .find(|link| link.attribute("name") == Some(name))
-    };
+    let link_of = |name: &str| tagged(robot, "link").find(|it| it.attribute("name") == Some(name));
     for name in [links.base, links.flange] {
         if link_of(name).is_none() {
-            let known: Vec<_> = robot
-                .children()
-                .filter(named("link"))
-                .filter_map(|it| it.attribute("name"))
-                .collect();
+            let known = tagged(robot, "link").filter_map(|it| it.attribute("name"));
+            let known: Vec<_> = known.collect();
             return Err(DescriptionError::NoLink {
                 name: name.to_owned(),
                 known: known.join(", "),
             });
         }
     }
-    // from the flange down to the base
-    let (mut way, mut at) = (Vec::new(), links.flange);
-    while at != links.base {
-        let is_below = |joint: &Node<'_, '_>| linked(joint, "child") == Some(at);
-        // a link is the child of one joint: a circular walk meets all of them
-        let below = robot
-            .children()
-            .filter(named("joint"))
-            .find(is_below)
-            .filter(|_| way.len() < MOST_JOINTS);
-        let parent = below.and_then(|joint| Some((joint, linked(&joint, "parent")?)));
-        let Some((joint, parent)) = parent else {
-            let [flange, base, end] = [links.flange, links.base, at].map(str::to_owned);
-            return Err(DescriptionError::NotConnected { flange, base, end });
-        };
-        way.push((joint, at));
-        at = parent;
-    }
     let (mut joints, mut pose) = (Vec::new(), Isometry3::identity());
     let mut chain_links = vec![ChainLink {
         name: links.base.into(),
         body: link_of(links.base).and_then(body),
     }];
-    for (joint, child) in way.into_iter().rev() {
+    for (joint, child) in path_of(robot, links)?.into_iter().rev() {
         pose *= origin(&joint)?;
         if let Some(turning) = turning(&joint, pose)? {
             joints.push(turning);
@@ -192,6 +164,32 @@ fn chain_of(text: &str, name: &str, links: &ArmLinks<'_>) -> Result<SerialChain,
     Ok(SerialChain::new(joints, chain_links, pose, links.radius)?)
 }
 
+fn tagged<'a, 'b>(node: Node<'a, 'b>, tag: &str) -> impl Iterator<Item = Node<'a, 'b>> {
+    node.children().filter(move |child| child.has_tag_name(tag))
+}
+
+/// Joints from the flange down to the base, each with its child.
+fn path_of<'a, 'b>(
+    robot: Node<'a, 'b>,
+    links: &ArmLinks<'a>,
+) -> Result<Vec<(Node<'a, 'b>, &'a str)>, DescriptionError> {
+    let (mut path, mut at) = (Vec::new(), links.flange);
+    while at != links.base {
+        // a link is the child of one joint: a circular walk meets all of them
+        let below = tagged(robot, "joint")
+            .find(|joint| linked(joint, "child") == Some(at))
+            .filter(|_| path.len() < MOST_JOINTS);
+        let parent = below.and_then(|joint| Some((joint, linked(&joint, "parent")?)));
+        let Some((joint, parent)) = parent else {
+            let [flange, base, end] = [links.flange, links.base, at].map(str::to_owned);
+            return Err(DescriptionError::NotConnected { flange, base, end });
+        };
+        path.push((joint, at));
+        at = parent;
+    }
+    Ok(path)
+}
+
 /// Maximum number of joints between base and flange, including fixed ones.
 const MOST_JOINTS: usize = 256;
 
@@ -200,7 +198,7 @@ fn linked<'a>(joint: &Node<'a, '_>, tag: &str) -> Option<&'a str> {
 }
 
 fn part<'a, 'b>(node: &Node<'a, 'b>, tag: &str) -> Option<Node<'a, 'b>> {
-    node.children().find(|child| child.has_tag_name(tag))
+    tagged(*node, tag).next()
 }
 
 fn fault(joint: &Node<'_, '_>, what: impl Into<String>) -> DescriptionError {

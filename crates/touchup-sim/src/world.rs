@@ -708,96 +708,102 @@ const WORKSHOP: WorldRanges = WorldRanges {
     },
 };
 
+const OPTICAL_TRACKER: WorldRanges = WorldRanges {
+    clock: [10e-3, 60e-3],
+    clock_rate: [-80e-6, 80e-6],
+    pose_noise: [0.07e-3, 0.2e-3],
+    pose_wander: [0.04e-3, 0.12e-3],
+    orientation_noise: [0.02 * DEGREE, 0.06 * DEGREE],
+    pose_rates: &[30.0, 60.0, 100.0, 120.0],
+    wrench_rates: &[125.0, 250.0, 1000.0],
+    lost: [0.006, 0.03],
+    late: [0.008, 0.03],
+    gap_rate: [0.15, 0.5],
+    stds: CalibrationStds {
+        tip_offset: 0.05e-3,
+        shift: 0.06e-3,
+        turn: 0.04 * DEGREE,
+        clock: 1e-3,
+        ..WORKSHOP.stds
+    },
+    ..WORKSHOP
+};
+
+const UR_ARM: WorldRanges = WorldRanges {
+    radius: [0.9e-3, 1.4e-3],
+    stiffness: [30e3, 90e3],
+    lateral: [0.35, 0.7],
+    tare: [0.3, 3.0],
+    tare_drift: [0.06, 0.2],
+    clock: [-4e-3, 1e-3],
+    clock_rate: [-1e-6, 1e-6],
+    pose_noise: [0.004e-3, 0.015e-3],
+    pose_wander: [0.02e-3, 0.045e-3],
+    orientation_noise: [0.002 * DEGREE, 0.01 * DEGREE],
+    force_noise: [0.08, 0.25],
+    force_step: [0.02, 0.1],
+    force_play: [0.06, 0.2],
+    pose_rates: &[125.0, 500.0],
+    wrench_rates: &[125.0, 500.0],
+    lost: [0.0, 0.001],
+    late: [0.0, 0.002],
+    gap_rate: [0.0, 0.02],
+    force: [3.0, 6.0],
+    habits: &[Habit::Slide, Habit::Tap],
+    stds: CalibrationStds {
+        radius: 2e-6,
+        tip_offset: 0.04e-3,
+        shift: 0.05e-3,
+        tare: 0.1,
+        ..WORKSHOP.stds
+    },
+    ..WORKSHOP
+};
+
+const SOFT_PROBE: WorldRanges = WorldRanges {
+    stiffness: [3e3, 9e3],
+    lateral: [0.15, 0.4],
+    tip_offset: [0.15, 0.3],
+    force: [0.8, 1.8],
+    stds: CalibrationStds {
+        stiffness: 0.06,
+        tip_offset: 0.04e-3,
+        ..WORKSHOP.stds
+    },
+    ..WORKSHOP
+};
+
+const CARELESS_OPERATOR: WorldRanges = WorldRanges {
+    friction: [0.2, 0.45],
+    friction_variation: [0.2, 0.35],
+    tare: [0.2, 1.5],
+    scan_edge: [2.6e-3, 3.5e-3],
+    scan_noise: [0.7e-3, 1.0e-3],
+    scan_bias: [-0.5e-3, 0.25e-3],
+    scan_scale: [-8e-4, 8e-4],
+    missing: [3.0, 10.0],
+    unevenness: [0.4, 0.7],
+    tilt: [8.0 * DEGREE, 15.0 * DEGREE],
+    stray: [0.3e-3, 0.8e-3],
+    habits: &[Habit::Slide, Habit::Scrub, Habit::Tap],
+    stds: CalibrationStds {
+        radius: 10e-6,
+        stiffness: 0.1,
+        shift: 0.1e-3,
+        tare: 0.08,
+        ..WORKSHOP.stds
+    },
+    ..WORKSHOP
+};
+
 impl SimWorld {
-    #[expect(clippy::too_many_lines)]
     fn ranges(self) -> WorldRanges {
-        let stds = WORKSHOP.stds;
         match self {
             Self::WorkshopStylus => WORKSHOP,
-            Self::OpticalTracker => WorldRanges {
-                clock: [10e-3, 60e-3],
-                clock_rate: [-80e-6, 80e-6],
-                pose_noise: [0.07e-3, 0.2e-3],
-                pose_wander: [0.04e-3, 0.12e-3],
-                orientation_noise: [0.02 * DEGREE, 0.06 * DEGREE],
-                pose_rates: &[30.0, 60.0, 100.0, 120.0],
-                wrench_rates: &[125.0, 250.0, 1000.0],
-                lost: [0.006, 0.03],
-                late: [0.008, 0.03],
-                gap_rate: [0.15, 0.5],
-                stds: CalibrationStds {
-                    tip_offset: 0.05e-3,
-                    shift: 0.06e-3,
-                    turn: 0.04 * DEGREE,
-                    clock: 1e-3,
-                    ..stds
-                },
-                ..WORKSHOP
-            },
-            Self::Ur => WorldRanges {
-                radius: [0.9e-3, 1.4e-3],
-                stiffness: [30e3, 90e3],
-                lateral: [0.35, 0.7],
-                tare: [0.3, 3.0],
-                tare_drift: [0.06, 0.2],
-                clock: [-4e-3, 1e-3],
-                clock_rate: [-1e-6, 1e-6],
-                pose_noise: [0.004e-3, 0.015e-3],
-                pose_wander: [0.02e-3, 0.045e-3],
-                orientation_noise: [0.002 * DEGREE, 0.01 * DEGREE],
-                force_noise: [0.08, 0.25],
-                force_step: [0.02, 0.1],
-                force_play: [0.06, 0.2],
-                pose_rates: &[125.0, 500.0],
-                wrench_rates: &[125.0, 500.0],
-                lost: [0.0, 0.001],
-                late: [0.0, 0.002],
-                gap_rate: [0.0, 0.02],
-                force: [3.0, 6.0],
-                habits: &[Habit::Slide, Habit::Tap],
-                stds: CalibrationStds {
-                    radius: 2e-6,
-                    tip_offset: 0.04e-3,
-                    shift: 0.05e-3,
-                    tare: 0.1,
-                    ..stds
-                },
-                ..WORKSHOP
-            },
-            Self::SoftProbe => WorldRanges {
-                stiffness: [3e3, 9e3],
-                lateral: [0.15, 0.4],
-                tip_offset: [0.15, 0.3],
-                force: [0.8, 1.8],
-                stds: CalibrationStds {
-                    stiffness: 0.06,
-                    tip_offset: 0.04e-3,
-                    ..stds
-                },
-                ..WORKSHOP
-            },
-            Self::CarelessOperator => WorldRanges {
-                friction: [0.2, 0.45],
-                friction_variation: [0.2, 0.35],
-                tare: [0.2, 1.5],
-                scan_edge: [2.6e-3, 3.5e-3],
-                scan_noise: [0.7e-3, 1.0e-3],
-                scan_bias: [-0.5e-3, 0.25e-3],
-                scan_scale: [-8e-4, 8e-4],
-                missing: [3.0, 10.0],
-                unevenness: [0.4, 0.7],
-                tilt: [8.0 * DEGREE, 15.0 * DEGREE],
-                stray: [0.3e-3, 0.8e-3],
-                habits: &[Habit::Slide, Habit::Scrub, Habit::Tap],
-                stds: CalibrationStds {
-                    radius: 10e-6,
-                    stiffness: 0.1,
-                    shift: 0.1e-3,
-                    tare: 0.08,
-                    ..stds
-                },
-                ..WORKSHOP
-            },
+            Self::OpticalTracker => OPTICAL_TRACKER,
+            Self::Ur => UR_ARM,
+            Self::SoftProbe => SOFT_PROBE,
+            Self::CarelessOperator => CARELESS_OPERATOR,
         }
     }
 }

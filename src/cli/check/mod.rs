@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 use clap::Args;
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 
 use super::probing::arm::{ArmArguments, Measurement, TouchesOutput};
 use super::probing::{KeptMeasurements, check_temperature, metres, millimetres};
@@ -216,9 +216,34 @@ pub(super) fn repeated(
         .0)
 }
 
+/// Errors of the spheres over the workspace.
+fn sphere_results(
+    touches: &[SphereTouches],
+    spheres: &[ReferenceSphere],
+    registered_at: &Vector3<f64>,
+    gates: Gates,
+) -> Result<SphereResults, CliError> {
+    let touched = touches.iter().enumerate();
+    let readings = touched.flat_map(|(sphere, touched)| {
+        touched.orientations.iter().map(move |one| SphereReading {
+            sphere,
+            centres: one.centres.clone(),
+        })
+    });
+    let readings: Vec<_> = readings.collect();
+    let sigma = gates.diameter_sigma_um * 1e-6;
+    let found = check_workspace(spheres, &readings, registered_at, sigma).map_err(|error| {
+        let mut unreached = touches.iter().flat_map(|touched| &touched.not_reached);
+        match unreached.next() {
+            Some(unreached) => CliError::arm(error).with(unreached),
+            None => CliError::arm(error),
+        }
+    })?;
+    Ok(SphereResults::of(&found, spheres, touches))
+}
+
 impl CheckReport {
     /// - `scene`: scene of the check; `temperature_c`: cell temperature, if not as in the scene.
-    #[expect(clippy::too_many_lines)]
     pub(super) fn of(
         touches: &CheckedTouches,
         spheres: &[ReferenceSphere],
@@ -231,45 +256,11 @@ impl CheckReport {
             .as_ref()
             .ok_or_else(|| CliError::usage("the scene names no `robot`"))?;
         let shared = robot.pattern.shared;
-        let readings_of = |(sphere, touched): (usize, &SphereTouches)| {
-            let reading = |centres: &Vec<_>| SphereReading {
-                sphere,
-                centres: centres.clone(),
-            };
-            touched
-                .orientations
-                .iter()
-                .map(|one| reading(&one.centres))
-                .collect::<Vec<_>>()
-        };
-        let readings: Vec<_> = touches
-            .spheres
-            .iter()
-            .enumerate()
-            .flat_map(readings_of)
-            .collect();
-        let results = || {
-            let found = check_workspace(
-                spheres,
-                &readings,
-                &shared.registered_at,
-                gates.diameter_sigma_um * 1e-6,
-            );
-            let unreached = touches
-                .spheres
-                .iter()
-                .flat_map(|touched| &touched.not_reached)
-                .next();
-            let found = found.map_err(|error| match unreached {
-                Some(unreached) => CliError::arm(error).with(unreached),
-                None => CliError::arm(error),
-            })?;
-            Ok::<_, CliError>(SphereResults::of(&found, spheres, &touches.spheres))
-        };
         let results = if spheres.is_empty() {
             None
         } else {
-            Some(results()?)
+            let found = sphere_results(&touches.spheres, spheres, &shared.registered_at, gates);
+            Some(found?)
         };
         let temperature_c = temperature_c.or(robot.temperature_c);
         let record = CheckRecord::new(SystemTime::now(), &robot.model_name(), temperature_c);

@@ -9,7 +9,7 @@ use std::path::Path;
 /// Functions of more than 60 lines of code, in all that is compiled: tests, benches, examples and
 /// fuzz targets too.
 const LONG_FUNCTIONS: Bound = Bound {
-    today: 151,
+    today: 118,
     wanted: 0,
 };
 

@@ -13,7 +13,6 @@ use crate::ros::convert::header;
 use crate::ros::messages::{DiagnosticArray, DiagnosticStatus, KeyValue};
 use crate::ros::port::{Endpoint, Publication};
 use touchup_session::live::{Latencies, Quantiles};
-use touchup_session::session::RecordingLoss;
 
 /// State before the first verdict on the samples.
 const BEGINS: &str = "begins";
@@ -48,7 +47,6 @@ impl RefinementWorker {
     }
 
     /// The state for an observer: a level of [`DiagnosticStatus`], and words.
-    #[expect(clippy::too_many_lines)]
     fn state(&mut self) -> (u8, String) {
         let now = self.setup.clock.now();
         let stale =
@@ -57,68 +55,16 @@ impl RefinementWorker {
             .streams
             .each_mut()
             .map(|stream| stream.check(now, stale));
-        if let Some(fault) = &self.fault {
-            return (DiagnosticStatus::ERROR, format!("stopped: {fault}"));
-        }
-        if let RecordingLoss {
-            reason: Some(reason),
-            is_refused: true,
-            ..
-        } = self.session.keeping.unrecorded()
-        {
-            let words = format!("does not record, make room on the disk and it goes on: {reason}");
+        if let Some(words) = self.stopped() {
             return (DiagnosticStatus::ERROR, words);
         }
         if self.stops.is_paused() {
             self.acceptance.restart();
-            return (
-                DiagnosticStatus::OK,
-                "paused: samples are passed over".to_owned(),
-            );
+            let words = "paused: samples are passed over".to_owned();
+            return (DiagnosticStatus::OK, words);
         }
-        if let Some((_, why)) = self
-            .lost_transform
-            .as_ref()
-            .filter(|(at, _)| now.saturating_duration_since(*at) < stale)
-        {
-            return (
-                DiagnosticStatus::WARN,
-                format!("holds, frames are not connected: {why}"),
-            );
-        }
-        if self.streams.iter().any(|stream| stream.arrived == 0)
-            && self.session.counters.refused.contains_key("unreadable")
-        {
-            return (
-                DiagnosticStatus::WARN,
-                format!(
-                    "waits, and something comes (unreadable): {}",
-                    meaning("unreadable")
-                ),
-            );
-        }
-        let unread = self.unread_topics();
-        if !unread.is_empty() {
-            return (
-                DiagnosticStatus::ERROR,
-                format!("cannot read what is published: {}", unread.join("; ")),
-            );
-        }
-        let missing = self
-            .moving
-            .as_ref()
-            .filter(|_| self.streams[0].arrived == 0);
-        if let Some(why) = missing.and_then(|moving| moving.missing(&self.resolver.frames)) {
-            return (
-                DiagnosticStatus::WARN,
-                format!("waits, frames are not connected: {why}"),
-            );
-        }
-        if self.streams.iter().all(|stream| stream.arrived == 0) {
-            return (
-                DiagnosticStatus::STALE,
-                "waits: neither pose nor wrench has come yet".to_owned(),
-            );
+        if let Some(state) = self.state_of_input(now, stale) {
+            return state;
         }
         let late = ["pose", "wrench"]
             .iter()
@@ -132,12 +78,55 @@ impl RefinementWorker {
         let ages: Vec<_> = ages.collect();
         if !ages.is_empty() {
             self.acceptance.restart();
-            return (
-                DiagnosticStatus::WARN,
-                format!("holds, a stream is stale: {}", ages.join(", ")),
-            );
+            let words = format!("holds, a stream is stale: {}", ages.join(", "));
+            return (DiagnosticStatus::WARN, words);
         }
         self.state_of_samples(now)
+    }
+
+    /// The fault that ended the refinement, or the disk that refuses its recording, in words.
+    fn stopped(&self) -> Option<String> {
+        if let Some(fault) = &self.fault {
+            return Some(format!("stopped: {fault}"));
+        }
+        let loss = self.session.keeping.unrecorded();
+        let reason = loss.reason.filter(|_| loss.is_refused)?;
+        Some(format!(
+            "does not record, make room on the disk and it goes on: {reason}"
+        ))
+    }
+
+    /// State without connected frames or readable messages.
+    fn state_of_input(&self, now: Instant, stale: Duration) -> Option<(u8, String)> {
+        let warn = |words| Some((DiagnosticStatus::WARN, words));
+        if let Some((_, why)) = self
+            .lost_transform
+            .as_ref()
+            .filter(|(at, _)| now.saturating_duration_since(*at) < stale)
+        {
+            return warn(format!("holds, frames are not connected: {why}"));
+        }
+        if self.streams.iter().any(|stream| stream.arrived == 0)
+            && self.session.counters.refused.contains_key("unreadable")
+        {
+            let why = meaning("unreadable");
+            return warn(format!("waits, and something comes (unreadable): {why}"));
+        }
+        let unread = self.unread_topics();
+        if !unread.is_empty() {
+            let words = format!("cannot read what is published: {}", unread.join("; "));
+            return Some((DiagnosticStatus::ERROR, words));
+        }
+        let missing = self
+            .moving
+            .as_ref()
+            .filter(|_| self.streams[0].arrived == 0);
+        if let Some(why) = missing.and_then(|moving| moving.missing(&self.resolver.frames)) {
+            return warn(format!("waits, frames are not connected: {why}"));
+        }
+        let is_silent = self.streams.iter().all(|stream| stream.arrived == 0);
+        let words = "waits: neither pose nor wrench has come yet";
+        is_silent.then(|| (DiagnosticStatus::STALE, words.to_owned()))
     }
 
     /// Silent sensor topics despite a publisher, each with the reason.
@@ -152,7 +141,6 @@ impl RefinementWorker {
     }
 
     /// State of the samples while both streams come.
-    #[expect(clippy::too_many_lines)]
     fn state_of_samples(&mut self, now: Instant) -> (u8, String) {
         let verdict =
             self.acceptance
@@ -165,45 +153,23 @@ impl RefinementWorker {
              alike",
             beyond.abs()
         );
-        let mut heard = self
-            .port
-            .sample_topics()
-            .into_iter()
-            .filter_map(|topic| self.endpoints.get(topic));
-        let mixed = heard.find(|endpoint| endpoint.count > 1);
-        if let Some(Endpoint { topic, count, .. }) = mixed {
-            let words = format!(
-                "mixes samples (of {count} publishers on {topic}): all but one measure something else; \
-                 `ros2 topic info -v {topic}` has their nodes"
-            );
+        if let Some(words) = self.mixed() {
             return (DiagnosticStatus::WARN, words);
         }
+        let named_apart = (beyond.abs() > NAMED_APART).then_some(&*apart);
         match verdict {
             SampleVerdict::Begins => (
                 DiagnosticStatus::STALE,
                 format!("{BEGINS}: poses and wrenches come, no sample yet"),
             ),
             SampleVerdict::Refuses { reason, count, of } => {
-                let is_repeated = reason.ends_with("duplicate");
-                let why = match reason.as_str() {
-                    of if (is_repeated || is_of_pairing(of)) && poses.is_unstamped() => {
-                        unstamped("poses")
-                    }
-                    of if (is_repeated || is_of_pairing(of)) && wrenches.is_unstamped() => {
-                        unstamped("wrenches")
-                    }
-                    of if is_of_pairing(of) && beyond.abs() > NAMED_APART => apart,
-                    of => meaning(of).to_owned(),
-                };
+                let why = self.why_refused(&reason, named_apart);
                 let words =
                     format!("refuses most of what comes ({reason}): {why}; {count} of {of} lately");
                 (DiagnosticStatus::WARN, words)
             }
             SampleVerdict::PairsNone => {
-                let why = match beyond.abs() > NAMED_APART {
-                    true => apart,
-                    false => "no wrench is stamped between two poses".to_owned(),
-                };
+                let why = named_apart.unwrap_or("no wrench is stamped between two poses");
                 (
                     DiagnosticStatus::WARN,
                     format!("makes no samples though poses and wrenches come: {why}"),
@@ -225,6 +191,35 @@ impl RefinementWorker {
                 )
             }
             SampleVerdict::Accepts => (DiagnosticStatus::OK, "runs: samples are taken".to_owned()),
+        }
+    }
+
+    /// A sensor topic with several publishers, in words.
+    fn mixed(&self) -> Option<String> {
+        let Endpoint { topic, count, .. } = self
+            .port
+            .sample_topics()
+            .into_iter()
+            .filter_map(|topic| self.endpoints.get(topic))
+            .find(|endpoint| endpoint.count > 1)?;
+        Some(format!(
+            "mixes samples (of {count} publishers on {topic}): all but one measure something else; \
+             `ros2 topic info -v {topic}` has their nodes"
+        ))
+    }
+
+    /// Cause of most refusals.
+    ///
+    /// - `apart`: offset between the stamps of both streams in words, if large.
+    fn why_refused(&self, reason: &str, apart: Option<&str>) -> String {
+        let [poses, wrenches] = &self.streams;
+        let is_pairing = is_of_pairing(reason);
+        let is_stamping = is_pairing || reason.ends_with("duplicate");
+        match apart {
+            _ if is_stamping && poses.is_unstamped() => unstamped("poses"),
+            _ if is_stamping && wrenches.is_unstamped() => unstamped("wrenches"),
+            Some(apart) if is_pairing => apart.to_owned(),
+            _ => meaning(reason).to_owned(),
         }
     }
 

@@ -1,5 +1,6 @@
 //! Selection of the touch to remove or restore, and the answers.
 
+use std::path::Path;
 use std::sync::mpsc::Receiver;
 use std::time::Duration;
 
@@ -9,10 +10,12 @@ use crate::ros::clock::time;
 use crate::ros::convert::{point, stamp_ns};
 use crate::ros::messages::{TakeOutTouchRequest, TakeOutTouchResponse};
 use crate::ros::port::Reply;
+use touchup_io::recording::Topics;
 use touchup_method::reconstruct::{Patcher, StrokeSpan};
 use touchup_method::stylus::ProbedPoint;
 use touchup_session::live::EvidenceReplay;
-use touchup_session::session::StrokeChange;
+use touchup_session::scene::Scene;
+use touchup_session::session::{EvidenceSource, StrokeChange};
 
 /// Maximum time of disk and patch until the touches are readable.
 pub(super) const READ_WAIT: Duration = Duration::from_secs(30);
@@ -48,6 +51,22 @@ pub(super) enum WantedTouch {
     Named(i64),
     /// touch of the contact nearest to a position, up to a distance, m, in O
     Near(Point3<f64>, f64),
+}
+
+/// The recorded samples of a session.
+pub(super) fn recorded_evidence<'a>(
+    recording: &'a Path,
+    topics: &'a Topics,
+    scene: &Scene,
+    until_ns: i64,
+) -> EvidenceSource<'a> {
+    EvidenceSource {
+        recording,
+        topics,
+        placement: scene.placement(),
+        sync: scene.sync_params(),
+        until_ns,
+    }
 }
 
 pub(super) fn refused(message: String) -> TakeOutTouchResponse {

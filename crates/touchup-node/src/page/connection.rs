@@ -115,7 +115,44 @@ fn hear(text: &str, site: &Site, role: Role, answers: &Sender<String>) {
     site.call(role, &call, request, reply);
 }
 
-#[expect(clippy::too_many_lines)]
+/// Content that a page has; a changed text replaces its predecessor.
+#[derive(Default)]
+struct SentContent {
+    /// position in the messages of the board
+    seen: u64,
+    state: String,
+    replay: String,
+    annotations: String,
+    /// state of the mesh of the sent uncertainties
+    known: MeshState,
+}
+
+impl SentContent {
+    /// Changed texts and new messages of the board.
+    fn changes(&mut self, site: &Site, role: Role) -> Vec<Message> {
+        let replay = site.replay.as_ref();
+        let annotations = site.annotations.of(&site.mesh.session());
+        let mut messages = Vec::new();
+        for (sent, now) in [
+            (&mut self.state, text_of("state", &site.state(role))),
+            (
+                &mut self.replay,
+                replay.and_then(|replay| text_of("replay", &replay.shown())),
+            ),
+            (&mut self.annotations, text_of("annotations", &annotations)),
+        ] {
+            let now = now.unwrap_or_default();
+            if now != *sent {
+                sent.clone_from(&now);
+                messages.push(Message::text(now));
+            }
+        }
+        let board = site.board.read(&mut self.seen);
+        messages.extend(board.into_iter().map(Message::text));
+        messages
+    }
+}
+
 async fn send(
     mut to_page: SplitSink<WebSocket, Message>,
     site: Arc<Site>,
@@ -125,36 +162,13 @@ async fn send(
     let (mut changes, follower) = (site.board.changes(), site.mesh.follow());
     let mut frames = interval(FRAME);
     frames.set_missed_tick_behavior(MissedTickBehavior::Delay);
-    let (mut seen, mut state, mut noted, mut signed) =
-        (0, String::new(), String::new(), Instant::now());
-    let mut replayed = String::new();
-    let mut known_state = MeshState::default();
+    let (mut sent, mut signed) = (SentContent::default(), Instant::now());
     loop {
         let mut messages = Vec::new();
         while let Ok(answer) = answers.try_recv() {
             messages.push(Message::text(answer));
         }
-        let now = text_of("state", &site.state(role)).unwrap_or_default();
-        if now != state {
-            state.clone_from(&now);
-            messages.push(Message::text(now));
-        }
-        let now = site
-            .replay
-            .as_ref()
-            .and_then(|replay| text_of("replay", &replay.shown()))
-            .unwrap_or_default();
-        if now != replayed {
-            replayed.clone_from(&now);
-            messages.push(Message::text(now));
-        }
-        let annotations = site.annotations.of(&site.mesh.session());
-        let now = text_of("annotations", &annotations).unwrap_or_default();
-        if now != noted {
-            noted.clone_from(&now);
-            messages.push(Message::text(now));
-        }
-        messages.extend(site.board.read(&mut seen).into_iter().map(Message::text));
+        messages.extend(sent.changes(&site, role));
         let mesh = follower.next_part(OF_A_MESSAGE);
         let has_more = mesh.is_some();
         // a copy only for the comparison with a nominal part
@@ -173,9 +187,9 @@ async fn send(
             && let Some(known) = site
                 .board
                 .known(&site.mesh.now().0.shape_state())
-                .filter(|known| known.state != known_state)
+                .filter(|known| known.state != sent.known)
         {
-            known_state.clone_from(&known.state);
+            sent.known.clone_from(&known.state);
             messages.extend(known.frames.iter().cloned().map(Message::binary));
         }
         if signed.elapsed() >= SIGN_OF_LIFE {
@@ -183,7 +197,7 @@ async fn send(
             // the browser answers the ping; the page sees the text
             messages.extend([
                 Message::Ping(Default::default()),
-                Message::text(state.clone()),
+                Message::text(sent.state.clone()),
             ]);
         }
         for message in messages {

@@ -348,26 +348,19 @@ impl Ros2ControlArm {
 
     fn check(&self, what: &'static str, speed: f64, acceleration: f64) -> Result<(), ArmError> {
         let most = self.params.top_speed;
-        let refuse = |reason| Err(ArmError::Refused { what, reason });
         if !(0.0..=most).contains(&speed) {
-            return refuse(format!("{speed} m/s is not from 0 to {most} m/s"));
+            return refuse(what, format!("{speed} m/s is not from 0 to {most} m/s"));
         }
         if acceleration.is_nan() || acceleration <= 0.0 || acceleration > TOP_ACCELERATION {
-            return refuse(format!(
-                "{acceleration} m/s² is not above 0 and up to {TOP_ACCELERATION} m/s²"
-            ));
+            return refuse(
+                what,
+                format!("{acceleration} m/s² is not above 0 and up to {TOP_ACCELERATION} m/s²"),
+            );
         }
         Ok(())
     }
 
-    #[expect(clippy::too_many_lines)]
     fn obey(&mut self, command: &Command) -> Result<(), ArmError> {
-        let refuse = |what, reason: &str| {
-            Err(ArmError::Refused {
-                what,
-                reason: reason.to_owned(),
-            })
-        };
         match *command {
             Command::Stop { deceleration } => {
                 self.check("a stop", 0.0, deceleration)?;
@@ -407,36 +400,41 @@ impl Ros2ControlArm {
                 force,
                 feed,
                 speed,
-            } => {
-                self.check("a press", feed.norm().max(speed), PRESS_ACCELERATION)?;
-                if !(0.0..=self.params.top_force).contains(&force) {
-                    return refuse(
-                        "a press",
-                        &format!("{force} N is not from 0 to {} N", self.params.top_force),
-                    );
-                }
-                let Some(axis) = axis
-                    .try_normalize(0.5)
-                    .filter(|axis| axis.iter().all(|part| part.is_finite()))
-                else {
-                    return refuse("a press", "its axis is no direction");
-                };
-                // dF/dt = K v: with v = (F − F_now)/(K T) the force converges with time constant T,
-                // stable for T of some latencies
-                let felt = -self.seen(&self.last).wrench_b.force.dot(&axis);
-                let gain =
-                    1.0 / (CALM * self.params.stiffness * (self.params.latency + self.period));
-                let across = feed - axis * feed.dot(&axis);
-                let v = axis * ((force - felt) * gain).clamp(-speed, speed) + across;
-                let motion = OrderedMotion::Press {
-                    axis,
-                    speed,
-                    feed: across,
-                    acceleration: PRESS_ACCELERATION,
-                };
-                self.go([v.x, v.y, v.z, 0.0, 0.0, 0.0], PRESS_ACCELERATION, &motion)
-            }
+            } => self.press(axis, force, feed, speed),
         }
+    }
+
+    fn press(
+        &mut self,
+        axis: Vector3<f64>,
+        force: f64,
+        feed: Vector3<f64>,
+        speed: f64,
+    ) -> Result<(), ArmError> {
+        self.check("a press", feed.norm().max(speed), PRESS_ACCELERATION)?;
+        let most = self.params.top_force;
+        if !(0.0..=most).contains(&force) {
+            return refuse("a press", format!("{force} N is not from 0 to {most} N"));
+        }
+        let Some(axis) = axis
+            .try_normalize(0.5)
+            .filter(|axis| axis.iter().all(|part| part.is_finite()))
+        else {
+            return refuse("a press", "its axis is no direction");
+        };
+        // dF/dt = K v: with v = (F − F_now)/(K T) the force converges with time constant T,
+        // stable for T of some latencies
+        let felt = -self.seen(&self.last).wrench_b.force.dot(&axis);
+        let gain = 1.0 / (CALM * self.params.stiffness * (self.params.latency + self.period));
+        let across = feed - axis * feed.dot(&axis);
+        let v = axis * ((force - felt) * gain).clamp(-speed, speed) + across;
+        let motion = OrderedMotion::Press {
+            axis,
+            speed,
+            feed: across,
+            acceleration: PRESS_ACCELERATION,
+        };
+        self.go([v.x, v.y, v.z, 0.0, 0.0, 0.0], PRESS_ACCELERATION, &motion)
     }
 
     fn go_at(&mut self, twist: [f64; 6], acceleration: f64) -> Result<(), ArmError> {
@@ -529,6 +527,13 @@ fn lasting([x, y, z, a, b, c]: &[f64; 6], acceleration: f64) -> f64 {
     (linear / acceleration).max(angular / TURN_ACCELERATION)
 }
 
+fn refuse<T>(what: &'static str, reason: impl Into<String>) -> Result<T, ArmError> {
+    Err(ArmError::Refused {
+        what,
+        reason: reason.into(),
+    })
+}
+
 /// The last of the first states, and their period, s.
 fn rated(
     reader: &mut StateReader,
@@ -549,10 +554,7 @@ fn rated(
         let reason = format!(
             "{topic} comes with {hz:.0} Hz, and {needed:.0} Hz are needed: raise update_rate of the controller manager"
         );
-        return Err(ArmError::Refused {
-            what: "to connect",
-            reason,
-        });
+        return refuse("to connect", reason);
     }
     Ok((last, period))
 }

@@ -245,7 +245,6 @@ pub(super) fn seen(state: &UrState) -> ArmState {
 /// Converts a command to an order.
 ///
 /// - `last`: state that the command follows.
-#[expect(clippy::too_many_lines)]
 pub(super) fn order_of(
     command: &Command,
     last: &UrState,
@@ -262,13 +261,9 @@ pub(super) fn order_of(
             if !is_pose {
                 return Err(refused("a line", "its end is no pose"));
             }
+            let from = pose_of(last.pose);
             Ok(OrderAction::Move {
-                twist: velocity_towards(
-                    &pose_of(last.pose),
-                    &to,
-                    [speed, acceleration],
-                    SETTLING_TIME,
-                ),
+                twist: velocity_towards(&from, &to, [speed, acceleration], SETTLING_TIME),
                 acceleration,
             })
         }
@@ -289,21 +284,17 @@ pub(super) fn order_of(
             speed,
         } => {
             check(params, "a press", feed.norm().max(speed), FEED_ACCELERATION)?;
-            if !(0.0..=params.top_force).contains(&force) {
-                let most = params.top_force;
-                return Err(refused(
-                    "a press",
-                    format!("{force} N is not from 0 to {most} N"),
-                ));
+            let most = params.top_force;
+            if !(0.0..=most).contains(&force) {
+                let reason = format!("{force} N is not from 0 to {most} N");
+                return Err(refused("a press", reason));
             }
-            let Some(frame) = frame_along(&axis) else {
-                return Err(refused("a press", "its axis is no direction"));
-            };
+            let frame =
+                frame_along(&axis).ok_or_else(|| refused("a press", "its axis is no direction"))?;
             let place = pose_of(last.pose).translation.vector;
-            let frame = Isometry3::from_parts(place.into(), frame);
             let across = feed - axis * feed.dot(&axis);
             Ok(OrderAction::Press {
-                frame: vector_of(&frame),
+                frame: vector_of(&Isometry3::from_parts(place.into(), frame)),
                 force_n: force,
                 speed,
                 feed: across.into(),

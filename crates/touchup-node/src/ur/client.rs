@@ -2,8 +2,9 @@
 
 use std::io::{BufRead, BufReader, Write};
 use std::os::unix::process::CommandExt;
-use std::process::{ChildStdin, Command, Stdio};
-use std::sync::mpsc::channel;
+use std::path::Path;
+use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, MutexGuard};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
@@ -37,30 +38,52 @@ fn be_in_time(is_lock_step: bool) {
     }
 }
 
+/// Starts the program with pipes.
+fn spawned(program: &Path) -> Result<Child, UrError> {
+    Command::new(program)
+        .args(["ur", "child"])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        // an interrupt from the terminal is for the parent, which stops the arm first
+        .process_group(0)
+        .spawn()
+        .map_err(|error| {
+            UrError::Client(format!("does not start ({}): {error}", program.display()))
+        })
+}
+
+/// Reads the reports of the process on a thread.
+fn reports_of(lines: ChildStdout, is_lock_step: bool) -> Receiver<ClientReport> {
+    let (sender, reports) = channel();
+    thread::spawn(move || {
+        be_in_time(is_lock_step);
+        for line in BufReader::new(lines).lines().map_while(Result::ok) {
+            let Ok(report) = serde_json::from_str::<ClientReport>(&line) else {
+                tracing::warn!(
+                    line,
+                    "the program that speaks to the arm said what is no report"
+                );
+                continue;
+            };
+            if sender.send(report).is_err() {
+                break;
+            }
+        }
+    });
+    reports
+}
+
 impl Client {
     /// Starts the process; returns when the arm takes commands.
     ///
     /// - `version`: major and minor, of the controller; `dashboard`: for the guard alone.
-    #[expect(clippy::too_many_lines)]
     pub fn start(
         params: &UrParams,
         version: [u32; 2],
         dashboard: Dashboard,
     ) -> Result<Self, UrError> {
-        let mut child = Command::new(&params.program)
-            .args(["ur", "child"])
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            // an interrupt from the terminal is for the parent, which stops the arm first
-            .process_group(0)
-            .spawn()
-            .map_err(|error| {
-                UrError::Client(format!(
-                    "does not start ({}): {error}",
-                    params.program.display()
-                ))
-            })?;
+        let mut child = spawned(&params.program)?;
         let (Some(mut orders), Some(lines), Some(words)) =
             (child.stdin.take(), child.stdout.take(), child.stderr.take())
         else {
@@ -79,22 +102,7 @@ impl Client {
             is_lock_step,
         };
         let sent = line_of(&begin).and_then(|line| orders.write_all(&line));
-        let (sender, reports) = channel();
-        thread::spawn(move || {
-            be_in_time(is_lock_step);
-            for line in BufReader::new(lines).lines().map_while(Result::ok) {
-                let Ok(report) = serde_json::from_str::<ClientReport>(&line) else {
-                    tracing::warn!(
-                        line,
-                        "the program that speaks to the arm said what is no report"
-                    );
-                    continue;
-                };
-                if sender.send(report).is_err() {
-                    break;
-                }
-            }
-        });
+        let reports = reports_of(lines, is_lock_step);
         thread::spawn(move || {
             for line in BufReader::new(words).lines().map_while(Result::ok) {
                 tracing::debug!(line, "from ur-rtde");
@@ -126,28 +134,28 @@ impl Client {
             id,
         };
         sent.map_err(|error| UrError::Client(format!("does not listen: {error}")))?;
-        let known = client.wait(params.deadlines.connect + params.deadlines.beat, |known| {
+        client.await_ready(params)?;
+        Ok(client)
+    }
+
+    /// Waits until the arm takes commands.
+    fn await_ready(&self, params: &UrParams) -> Result<(), UrError> {
+        let known = self.wait(params.deadlines.connect + params.deadlines.beat, |known| {
             known.is_ready
         });
         match known.broken.clone() {
-            None if known.is_ready => {}
-            Some(ClientLoss::Wheel(reason)) => {
-                return Err(UrError::Wheel {
-                    site_packages: params.site_packages.clone(),
-                    reason,
-                });
-            }
-            Some(ClientLoss::Tool(reason)) => return Err(UrError::Tool(reason)),
-            Some(ClientLoss::Arm(ArmError::Client { reason })) => {
-                return Err(UrError::Client(reason));
-            }
+            None if known.is_ready => Ok(()),
+            Some(ClientLoss::Wheel(reason)) => Err(UrError::Wheel {
+                site_packages: params.site_packages.clone(),
+                reason,
+            }),
+            Some(ClientLoss::Tool(reason)) => Err(UrError::Tool(reason)),
+            Some(ClientLoss::Arm(ArmError::Client { reason })) => Err(UrError::Client(reason)),
             Some(ClientLoss::Arm(error)) => {
-                return Err(UrError::Client(format!("lost the arm at once: {error}")));
+                Err(UrError::Client(format!("lost the arm at once: {error}")))
             }
-            None => return Err(UrError::Client("says nothing".to_owned())),
+            None => Err(UrError::Client("says nothing".to_owned())),
         }
-        drop(known);
-        Ok(client)
     }
 
     /// Waits for a condition, a broken client, or the deadline.

@@ -303,7 +303,6 @@ impl GuardState {
     }
 
     /// Handles a line of the client; returns a fault.
-    #[expect(clippy::too_many_lines)]
     pub fn take(&mut self, report: ClientReport, now: Instant) -> Option<ClientLoss> {
         match report {
             ClientReport::Ready => {
@@ -314,24 +313,7 @@ impl GuardState {
                 self.lateness = Lateness::new(now);
             }
             ClientReport::State(state) => {
-                (self.fresh_at, self.newest_s) = (Some(now), state.stamp_s);
-                self.lateness.take(state.stamp_s, now);
-                // a state after a safety stop carries its own reason
-                let has_ended = !state.is_playing() && state.safety() == Safety::Normal;
-                self.ended_since = has_ended.then(|| self.ended_since.unwrap_or(now));
-                if self.states.len() == WAITING {
-                    self.states.pop_front();
-                }
-                self.states.push_back(*state);
-                self.serve(state.served, now);
-                // a program that does not play belongs to somebody else, or stands
-                if !self.is_ready || self.has_halted || !state.may_move() {
-                    self.cycle = None;
-                } else if let Some(fault) = self.hangs(&state).or_else(|| {
-                    let since = now.saturating_duration_since(self.begun_at);
-                    self.obedience
-                        .see(&pose_of(state.pose), &state.velocity, since)
-                }) {
+                if let Some(fault) = self.take_state(*state, now) {
                     return Some(ClientLoss::Arm(fault));
                 }
             }
@@ -356,6 +338,35 @@ impl GuardState {
                 )));
             }
         }
+        self.overdue(now)
+    }
+
+    /// Notes a state; returns a fault of the program or the arm.
+    fn take_state(&mut self, state: UrState, now: Instant) -> Option<ArmError> {
+        (self.fresh_at, self.newest_s) = (Some(now), state.stamp_s);
+        self.lateness.take(state.stamp_s, now);
+        // a state after a safety stop carries its own reason
+        let has_ended = !state.is_playing() && state.safety() == Safety::Normal;
+        self.ended_since = has_ended.then(|| self.ended_since.unwrap_or(now));
+        if self.states.len() == WAITING {
+            self.states.pop_front();
+        }
+        self.states.push_back(state);
+        self.serve(state.served, now);
+        // a program that does not play belongs to somebody else, or stands
+        if !self.is_ready || self.has_halted || !state.may_move() {
+            self.cycle = None;
+            return None;
+        }
+        self.hangs(&state).or_else(|| {
+            let since = now.saturating_duration_since(self.begun_at);
+            self.obedience
+                .see(&pose_of(state.pose), &state.velocity, since)
+        })
+    }
+
+    /// Fault of states, or of a call, missing for too long.
+    fn overdue(&self, now: Instant) -> Option<ClientLoss> {
         let since =
             |at: Option<Instant>| at.map_or(Duration::ZERO, |at| now.saturating_duration_since(at));
         let silent = since(self.fresh_at);
@@ -411,7 +422,6 @@ pub(super) struct Guard {
 
 impl Guard {
     /// Runs until the client ends; returns how it stopped the arm after a fault.
-    #[expect(clippy::too_many_lines)]
     pub fn watch(mut self, reports: &Receiver<ClientReport>) -> Option<Halt> {
         let clock = self.shared.clock.clone();
         let mut stamp_s = f64::INFINITY;
@@ -424,28 +434,7 @@ impl Guard {
                 clock.recv_timeout(reports, patience)
             };
             let broken = match report {
-                Ok(report) => {
-                    if let (Some(hand), ClientReport::State(state)) = (&self.hand, &report) {
-                        hand.advance(
-                            Duration::try_from_secs_f64(state.stamp_s - stamp_s)
-                                .unwrap_or_default(),
-                        );
-                        stamp_s = state.stamp_s;
-                    }
-                    let mut known = self.shared.known();
-                    let is_to_be_ended = matches!(&report, ClientReport::State(state) if known.is_to_be_ended(state));
-                    let broken = known.take(report, clock.now());
-                    drop(known);
-                    self.shared.changed.notify_all();
-                    if is_to_be_ended {
-                        let halt = self.halt();
-                        tracing::warn!(
-                            ?halt,
-                            "something stopped the arm: its program is ended, so that nothing goes on by itself"
-                        );
-                    }
-                    broken
-                }
+                Ok(report) => self.take(report, &mut stamp_s),
                 // the client ended on request
                 Err(RecvTimeoutError::Disconnected)
                     if self.shared.known().closing_since.is_some() =>
@@ -481,6 +470,31 @@ impl Guard {
             self.shared.changed.notify_all();
         }
         halt
+    }
+
+    /// Handles a line of the client; returns a fault.
+    ///
+    /// - `stamp_s`: of the last state.
+    fn take(&mut self, report: ClientReport, stamp_s: &mut f64) -> Option<ClientLoss> {
+        if let (Some(hand), ClientReport::State(state)) = (&self.hand, &report) {
+            let passed = Duration::try_from_secs_f64(state.stamp_s - *stamp_s);
+            hand.advance(passed.unwrap_or_default());
+            *stamp_s = state.stamp_s;
+        }
+        let mut known = self.shared.known();
+        let is_to_be_ended =
+            matches!(&report, ClientReport::State(state) if known.is_to_be_ended(state));
+        let broken = known.take(report, self.shared.clock.now());
+        drop(known);
+        self.shared.changed.notify_all();
+        if is_to_be_ended {
+            let halt = self.halt();
+            tracing::warn!(
+                ?halt,
+                "something stopped the arm: its program is ended, so that nothing goes on by itself"
+            );
+        }
+        broken
     }
 
     fn halt(&mut self) -> Halt {

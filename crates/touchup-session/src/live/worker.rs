@@ -66,95 +66,118 @@ pub(super) struct Worker {
     batches: Vec<Vec<ContactSample>>,
 }
 
-impl Worker {
-    #[expect(clippy::too_many_lines)]
-    pub fn new(scans: PatchedScans, mut patcher: Patcher, gate: Gate) -> Result<Self, LiveError> {
-        let (questions, inbox) = channel::<(Question, WorkGuard)>();
-        let (to_engine, answers) = channel();
-        let gate_of_thread = gate.clone();
-        let work = move || {
-            give_way();
-            let gate = gate_of_thread;
-            let mut published = PublishedList::default();
-            let PatchedScans {
-                working: scan,
-                shown,
-            } = scans;
-            // time of the far renewal after an answer, which counts for the next
-            let mut far = Duration::ZERO;
-            for (question, _working) in inbox {
-                let (mut batch, mut changed_stroke_ns, mut has_replaced) =
-                    (Vec::new(), None, false);
-                let is_renewal = matches!(question, Question::Renew(_));
-                let mut begun = gate.now();
-                let settles = matches!(question, Question::Settle);
-                match question {
-                    Question::Renew(samples) => {
-                        gate.pass();
-                        begun = gate.now();
-                        samples.iter().for_each(|sample| patcher.push(sample));
-                        batch = samples;
-                        batch.clear();
-                    }
-                    Question::Copy(samples, to) => {
-                        let mut copy = patcher.copy();
-                        samples.iter().for_each(|sample| copy.push(sample));
-                        // the receiver may be gone
-                        let _ = to.send(copy);
-                        continue;
-                    }
-                    Question::Flush => patcher.flush(),
-                    Question::Settle => {}
-                    Question::ChangeStrokes(change) => changed_stroke_ns = change(&mut patcher),
-                    Question::Replace(next, last_ns) => {
-                        let before = std::mem::replace(&mut patcher, *next);
-                        patcher.take_over(before, last_ns);
-                        has_replaced = true;
-                    }
-                }
-                let mut at_rest = None;
-                let delta = match &shown {
-                    _ if !settles => patcher.renewed(&scan.0, &scan.1),
-                    None => patcher.settled(&scan.0, &scan.1),
-                    Some(shown) => {
-                        let patch = patcher.patch_of_all(&shown.0, &shown.1);
-                        let nothing = PatchDelta {
-                            until_ns: patch.until_ns,
-                            ..PatchDelta::default()
-                        };
-                        at_rest = Some(patch);
-                        nothing
-                    }
-                };
-                let touches = patcher.probed();
-                let probed = if has_replaced {
-                    published.all(touches)
-                } else {
-                    published.changes(touches)
-                };
-                let answer = WorkerAnswer {
-                    delta,
-                    at_rest,
-                    probed,
-                    changed_stroke_ns,
-                    has_replaced,
-                    took: far + gate.now().saturating_duration_since(begun),
-                    batch,
-                };
-                if to_engine.send(answer).is_err() {
-                    break;
-                }
-                if is_renewal {
-                    gate.note_done();
-                    // while the next samples come
-                    let answered = gate.now();
-                    patcher.renew_far(&scan.0, &scan.1);
-                    far = gate.now().saturating_duration_since(answered);
-                }
+/// The patcher and its requests, on the thread.
+struct PatchLoop {
+    gate: Gate,
+    patcher: Patcher,
+    scans: PatchedScans,
+    published: PublishedList,
+    /// time of the far renewal after an answer, which counts for the next
+    far: Duration,
+}
+
+impl PatchLoop {
+    fn run(
+        mut self,
+        inbox: Receiver<(Question, WorkGuard)>,
+        to_engine: &Sender<WorkerAnswer>,
+    ) -> Patcher {
+        give_way();
+        for (question, _working) in inbox {
+            let is_renewal = matches!(question, Question::Renew(_));
+            let Some(answer) = self.answer(question) else {
+                continue;
+            };
+            if to_engine.send(answer).is_err() {
+                break;
             }
-            patcher
+            if is_renewal {
+                self.gate.note_done();
+                // while the next samples come
+                let answered = self.gate.now();
+                let (scan, tree) = &*self.scans.working;
+                self.patcher.renew_far(scan, tree);
+                self.far = self.gate.now().saturating_duration_since(answered);
+            }
+        }
+        self.patcher
+    }
+
+    /// Serves a request; a copy has no answer.
+    fn answer(&mut self, question: Question) -> Option<WorkerAnswer> {
+        let patcher = &mut self.patcher;
+        let (mut batch, mut changed_stroke_ns, mut has_replaced) = (Vec::new(), None, false);
+        let mut begun = self.gate.now();
+        let settles = matches!(question, Question::Settle);
+        match question {
+            Question::Renew(samples) => {
+                self.gate.pass();
+                begun = self.gate.now();
+                samples.iter().for_each(|sample| patcher.push(sample));
+                batch = samples;
+                batch.clear();
+            }
+            Question::Copy(samples, to) => {
+                let mut copy = patcher.copy();
+                samples.iter().for_each(|sample| copy.push(sample));
+                // the receiver may be gone
+                let _ = to.send(copy);
+                return None;
+            }
+            Question::Flush => patcher.flush(),
+            Question::Settle => {}
+            Question::ChangeStrokes(change) => changed_stroke_ns = change(patcher),
+            Question::Replace(next, last_ns) => {
+                let before = std::mem::replace(patcher, *next);
+                patcher.take_over(before, last_ns);
+                has_replaced = true;
+            }
+        }
+        let (scan, tree) = &*self.scans.working;
+        let (delta, at_rest) = match &self.scans.shown {
+            _ if !settles => (patcher.renewed(scan, tree), None),
+            None => (patcher.settled(scan, tree), None),
+            Some(shown) => {
+                let patch = patcher.patch_of_all(&shown.0, &shown.1);
+                let nothing = PatchDelta {
+                    until_ns: patch.until_ns,
+                    ..PatchDelta::default()
+                };
+                (nothing, Some(patch))
+            }
         };
-        let thread = Builder::new().name("patch".to_owned()).spawn(work);
+        let touches = patcher.probed();
+        let probed = if has_replaced {
+            self.published.all(touches)
+        } else {
+            self.published.changes(touches)
+        };
+        Some(WorkerAnswer {
+            delta,
+            at_rest,
+            probed,
+            changed_stroke_ns,
+            has_replaced,
+            took: self.far + self.gate.now().saturating_duration_since(begun),
+            batch,
+        })
+    }
+}
+
+impl Worker {
+    pub fn new(scans: PatchedScans, patcher: Patcher, gate: Gate) -> Result<Self, LiveError> {
+        let (questions, inbox) = channel();
+        let (to_engine, answers) = channel();
+        let patch_loop = PatchLoop {
+            gate: gate.clone(),
+            patcher,
+            scans,
+            published: PublishedList::default(),
+            far: Duration::ZERO,
+        };
+        let thread = Builder::new()
+            .name("patch".to_owned())
+            .spawn(move || patch_loop.run(inbox, &to_engine));
         let thread = thread.map_err(|error| LiveError::NoThread(error.to_string()))?;
         Ok(Self {
             gate,

@@ -66,15 +66,35 @@ impl Scene {
     ///
     /// - `unused`: parts without use for the task at hand, each with the reason.
     /// - `features`: optional features of the program, and whether this build has them.
-    #[expect(clippy::too_many_lines)]
     pub fn built(&self, unused: &[LeftOut], features: &[(&'static str, bool)]) -> SceneParts {
-        let unless = |is_there: bool, reason| if is_there { None } else { Some(reason) };
+        let compiled = features
+            .iter()
+            .map(|&(name, is_there)| (name, unless(is_there, NOT_COMPILED)));
+        let mut built = SceneParts {
+            built: Vec::new(),
+            left_out: Vec::new(),
+        };
+        for (part, reason) in self.reasons().into_iter().chain(compiled) {
+            let of_task = unused
+                .iter()
+                .find(|left| left.part == part)
+                .map(|left| left.reason);
+            match reason.or(of_task) {
+                Some(reason) => built.left_out.push(LeftOut { part, reason }),
+                None => built.built.push(part),
+            }
+        }
+        built
+    }
+
+    /// Parts of the scene, each with the reason if it is inactive.
+    fn reasons(&self) -> [(&'static str, Option<&'static str>); 17] {
         let not_robust = match &self.refine {
             None => Some(NOTHING_MOVES),
             Some(refine) => unless(refine.mode == Mode::Robust, PUBLISHED),
         };
         let not_either = not_robust.filter(|_| !self.has_patch());
-        let parts = [
+        [
             ("sync", unless(self.sync.is_some(), OFF)),
             ("clock", unless(self.clock.is_some(), OFF)),
             ("markers", unless(self.markers.is_some(), NOT_NAMED)),
@@ -113,26 +133,12 @@ impl Scene {
             ),
             ("robot", unless(self.robot.is_some(), NOT_NAMED)),
             ("refine", unless(self.refine.is_some(), OFF)),
-        ];
-        let compiled = features
-            .iter()
-            .map(|&(name, is_there)| (name, unless(is_there, NOT_COMPILED)));
-        let mut built = SceneParts {
-            built: Vec::new(),
-            left_out: Vec::new(),
-        };
-        for (part, reason) in parts.into_iter().chain(compiled) {
-            let of_task = unused
-                .iter()
-                .find(|left| left.part == part)
-                .map(|left| left.reason);
-            match reason.or(of_task) {
-                Some(reason) => built.left_out.push(LeftOut { part, reason }),
-                None => built.built.push(part),
-            }
-        }
-        built
+        ]
     }
+}
+
+fn unless(is_there: bool, reason: &'static str) -> Option<&'static str> {
+    (!is_there).then_some(reason)
 }
 
 /// Groups inactive parts by reason.

@@ -201,9 +201,32 @@ impl Scene {
     ///
     /// # Errors
     /// [`SceneError::Setting`], [`SceneError::Incomplete`].
-    #[expect(clippy::too_many_lines)]
     pub fn validate(&self) -> Result<(), SceneError> {
         self.check()?;
+        self.check_complete()?;
+        let tip = self.tip.as_ref();
+        let shape = tip.map(|tip| tip.shape);
+        let radius = tip.map_or(0.0, |tip| tip.ball.radius);
+        TipBody::new(self.tip_shape(), radius)?;
+        for (is_missing, needs) in [
+            (
+                radius <= 0.0 && shape != Some(ShapeName::Cone),
+                "tip.radius_mm above 0",
+            ),
+            (self.contact.is_none(), "contact"),
+        ] {
+            if self.has_patch() && is_missing {
+                return Err(SceneError::Unmet {
+                    part: "patch",
+                    needs,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// Checks the keys that need others.
+    fn check_complete(&self) -> Result<(), SceneError> {
         let tip = self.tip.as_ref();
         let shape = tip.map(|tip| tip.shape);
         let radius = tip.map_or(0.0, |tip| tip.ball.radius);
@@ -252,21 +275,6 @@ impl Scene {
         ] {
             if is_missing {
                 return Err(SceneError::Incomplete { key, needs });
-            }
-        }
-        TipBody::new(self.tip_shape(), radius)?;
-        for (is_missing, needs) in [
-            (
-                radius <= 0.0 && shape != Some(ShapeName::Cone),
-                "tip.radius_mm above 0",
-            ),
-            (self.contact.is_none(), "contact"),
-        ] {
-            if self.has_patch() && is_missing {
-                return Err(SceneError::Unmet {
-                    part: "patch",
-                    needs,
-                });
             }
         }
         Ok(())

@@ -49,7 +49,6 @@ impl SweepPlan {
     ///
     /// # Errors
     /// [`SweepError`]
-    #[expect(clippy::too_many_lines)]
     pub fn read(grid: &Path, recordings: &[PathBuf], folder: &Path) -> Result<Self, SweepError> {
         let mut grid = SweepGrid::read(grid, recordings)?;
         let refused = |why: String| SweepError::Grid {
@@ -74,32 +73,7 @@ impl SweepPlan {
         {
             (grid.scan, mesh_unit) = (Some(file), unit);
         }
-        let settings = grid
-            .sampling
-            .count(&grid.keys)
-            .filter(|count| *count <= MOST_JOBS);
-        let inputs =
-            grid.simulate
-                .as_ref()
-                .map_or(grid.recordings.len(), |simulate| simulate.seeds.len()) as u64;
-        let jobs = settings
-            .and_then(|settings| settings.checked_mul(inputs))
-            .filter(|jobs| *jobs <= MOST_JOBS);
-        let (Some(settings), Some(_)) = (settings, jobs) else {
-            let jobs = grid
-                .sampling
-                .count(&grid.keys)
-                .and_then(|count| count.checked_mul(inputs));
-            let jobs = jobs.map_or_else(
-                || "more than can be counted:".to_owned(),
-                |jobs| jobs.to_string(),
-            );
-            return Err(SweepError::TooMany {
-                path: grid.path,
-                jobs,
-                most: MOST_JOBS,
-            });
-        };
+        let settings = settings_of(&grid)?;
         // checks every setting before any output
         for at in 0..settings {
             let setting = grid.sampling.setting(&grid.keys, at);
@@ -184,6 +158,27 @@ impl SweepPlan {
             seed: *seed,
             keys,
         }
+    }
+}
+
+/// Number of settings.
+fn settings_of(grid: &SweepGrid) -> Result<u64, SweepError> {
+    let settings = grid.sampling.count(&grid.keys);
+    let inputs = match &grid.simulate {
+        Some(simulate) => simulate.seeds.len(),
+        None => grid.recordings.len(),
+    };
+    let jobs = settings.and_then(|settings| settings.checked_mul(inputs as u64));
+    match (settings, jobs) {
+        (Some(settings), Some(jobs)) if settings.max(jobs) <= MOST_JOBS => Ok(settings),
+        (_, jobs) => Err(SweepError::TooMany {
+            path: grid.path.clone(),
+            jobs: jobs.map_or_else(
+                || "more than can be counted:".to_owned(),
+                |jobs| jobs.to_string(),
+            ),
+            most: MOST_JOBS,
+        }),
     }
 }
 

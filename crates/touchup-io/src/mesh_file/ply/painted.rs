@@ -29,7 +29,6 @@ const COORDINATES: [[&str; 2]; 4] = [
     ["texture_s", "texture_t"],
 ];
 /// The triangles of [`read`] with their appearance.
-#[expect(clippy::too_many_lines)]
 pub(in crate::mesh_file) fn read_painted(bytes: &[u8], scale: f64) -> Result<PaintedSoup, Syntax> {
     let header = PlyHeader::read(bytes)?;
     let element = |name: &str| header.elements.iter().find(|element| element.name == name);
@@ -50,29 +49,15 @@ pub(in crate::mesh_file) fn read_painted(bytes: &[u8], scale: f64) -> Result<Pai
     let mut body = body_of(bytes, &header, "vertex")?;
     let (positions, [r, g, b, a, u, v]) =
         read_vertices(&mut body, vertex, scale, [r, g, b, a, u, v])?;
-    let byte = |name: Option<&str>| {
-        let kind = name
-            .and_then(|name| vertex.scalar(name))
-            .map(|column| vertex.properties[column].kind);
-        // 0 to 1 unless they are integers
-        let full = if matches!(kind, Some(PlyKind::Scalar(Scalar::F32 | Scalar::F64))) {
-            255.0
-        } else {
-            1.0
-        };
-        move |value: f32| (value * full).round() as u8
+    let kind = colours
+        .and_then(|names| vertex.scalar(names[0]))
+        .map(|column| vertex.properties[column].kind);
+    // 0 to 1 unless they are integers
+    let full = match kind {
+        Some(PlyKind::Scalar(Scalar::F32 | Scalar::F64)) => 255.0,
+        _ => 1.0,
     };
-    let byte = byte(colours.map(|names| names[0]));
-    let colours = match (r, g, b, a) {
-        (Some(r), Some(g), Some(b), Some(a)) => {
-            let of = |i: usize| [r[i], g[i], b[i], a[i]].map(byte);
-            Some(VertexColours::Rgba((0..r.len()).map(of).collect()))
-        }
-        (Some(r), Some(g), Some(b), None) => Some(VertexColours::Rgb(
-            (0..r.len()).map(|i| [r[i], g[i], b[i]].map(byte)).collect(),
-        )),
-        _ => None,
-    };
+    let colours = vertex_colours([r, g, b], a, full);
     let images = images(&bytes[..header.len]);
     if let Some(face) = face {
         let (faces, texture) = read_corners(bytes, &header, face, &positions)?;
@@ -105,6 +90,26 @@ pub(in crate::mesh_file) fn read_painted(bytes: &[u8], scale: f64) -> Result<Pai
         faces,
         colours,
         texture,
+    })
+}
+
+/// Colours of the vertices, if all of red, green and blue are there.
+///
+/// - `full`: factor from a value to a byte.
+fn vertex_colours(
+    [r, g, b]: [Option<Vec<f32>>; 3],
+    opacity: Option<Vec<f32>>,
+    full: f32,
+) -> Option<VertexColours> {
+    let byte = |value: f32| (value * full).round() as u8;
+    let (r, g, b) = (r?, g?, b?);
+    let vertices = 0..r.len();
+    Some(match opacity {
+        Some(a) => {
+            let of = |i: usize| [r[i], g[i], b[i], a[i]].map(byte);
+            VertexColours::Rgba(vertices.map(of).collect())
+        }
+        None => VertexColours::Rgb(vertices.map(|i| [r[i], g[i], b[i]].map(byte)).collect()),
     })
 }
 

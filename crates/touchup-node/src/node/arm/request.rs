@@ -2,7 +2,7 @@
 
 use crate::ros::messages::{ProbeResult, ProbeSettings};
 use touchup_features::features::FeatureKind;
-use touchup_probing::arm::{CRAWL, RequestLimits};
+use touchup_probing::arm::{CRAWL, RequestLimits, TouchParams};
 use touchup_probing::execute::ProbeParams;
 use touchup_probing::plan::{FeatureQuantity, sigma_of};
 
@@ -22,14 +22,12 @@ impl RequestSettings {
     ///
     /// # Errors
     /// A code of [`ProbeResult`] and the reason.
-    #[expect(clippy::too_many_lines)]
     pub fn of(
         settings: &ProbeSettings,
         configured: &ProbeParams,
         kind: Option<FeatureKind>,
     ) -> Result<Self, (u8, String)> {
         let bad = |why: String| (ProbeResult::BAD_REQUEST, why);
-        let some = |asked: f64| (asked != 0.0).then_some(asked);
         let by = RequestLimits {
             force: some(settings.max_force),
             search: some(settings.max_search_travel),
@@ -39,34 +37,8 @@ impl RequestSettings {
         let mut params = configured
             .narrowed(&by)
             .map_err(|why| bad(why.to_string()))?;
-        let (search, link) = (settings.max_search_speed, settings.max_link_speed);
-        let touch = &mut params.touch;
-        for (what, asked, speed) in [
-            ("max_search_speed", search, &mut touch.search_speed),
-            ("max_link_speed", link, &mut touch.link_speed),
-        ] {
-            match some(asked) {
-                None => {}
-                Some(asked) if asked >= CRAWL && asked <= *speed => *speed = asked,
-                Some(asked) => {
-                    let range = format!("from {CRAWL} m/s to the configured {speed} m/s");
-                    return Err(bad(format!("{what} of {asked} m/s: it may be {range}")));
-                }
-            }
-        }
-        params.pattern.quantity = match settings.quantity {
-            ProbeSettings::QUANTITY_ALL => FeatureQuantity::All,
-            ProbeSettings::QUANTITY_POSITION => FeatureQuantity::Position,
-            ProbeSettings::QUANTITY_AXIS => FeatureQuantity::Axis,
-            ProbeSettings::QUANTITY_DIAMETER => FeatureQuantity::Diameter,
-            ProbeSettings::QUANTITY_LENGTH => FeatureQuantity::Length,
-            ProbeSettings::QUANTITY_WIDTH => FeatureQuantity::Width,
-            other => {
-                return Err(bad(format!(
-                    "touches cannot be chosen for quantity {other}"
-                )));
-            }
-        };
+        narrow_speeds(&mut params.touch, settings).map_err(bad)?;
+        params.pattern.quantity = quantity_of(settings).map_err(bad)?;
         if !params.pattern.quantity.is_of(kind) {
             let kind = kind.map_or("unknown region", FeatureKind::name);
             return Err(bad(format!(
@@ -94,6 +66,42 @@ impl RequestSettings {
             is_dry_run: settings.dry_run,
         })
     }
+}
+
+/// A requested number; 0 requests none.
+fn some(asked: f64) -> Option<f64> {
+    (asked != 0.0).then_some(asked)
+}
+
+/// Narrows the speeds of a touch.
+fn narrow_speeds(touch: &mut TouchParams, settings: &ProbeSettings) -> Result<(), String> {
+    let (search, link) = (settings.max_search_speed, settings.max_link_speed);
+    for (what, asked, speed) in [
+        ("max_search_speed", search, &mut touch.search_speed),
+        ("max_link_speed", link, &mut touch.link_speed),
+    ] {
+        match some(asked) {
+            None => {}
+            Some(asked) if asked >= CRAWL && asked <= *speed => *speed = asked,
+            Some(asked) => {
+                let range = format!("from {CRAWL} m/s to the configured {speed} m/s");
+                return Err(format!("{what} of {asked} m/s: it may be {range}"));
+            }
+        }
+    }
+    Ok(())
+}
+
+fn quantity_of(settings: &ProbeSettings) -> Result<FeatureQuantity, String> {
+    Ok(match settings.quantity {
+        ProbeSettings::QUANTITY_ALL => FeatureQuantity::All,
+        ProbeSettings::QUANTITY_POSITION => FeatureQuantity::Position,
+        ProbeSettings::QUANTITY_AXIS => FeatureQuantity::Axis,
+        ProbeSettings::QUANTITY_DIAMETER => FeatureQuantity::Diameter,
+        ProbeSettings::QUANTITY_LENGTH => FeatureQuantity::Length,
+        ProbeSettings::QUANTITY_WIDTH => FeatureQuantity::Width,
+        other => return Err(format!("touches cannot be chosen for quantity {other}")),
+    })
 }
 
 /// Requested standard deviation, m or rad.

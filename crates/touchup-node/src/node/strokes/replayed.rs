@@ -3,10 +3,10 @@
 
 use crate::node::keeping::{Keeping, ReplayedSession};
 use crate::node::refinement::RefinementWorker;
-use crate::node::take_out::NO_PATCH;
+use crate::node::take_out::{NO_PATCH, recorded_evidence};
 use crate::ros::messages::ProbeResult;
 use crate::ros::port::{Arrival, Call, ReplayStep};
-use touchup_session::session::{EvidenceSource, Removal, StrokeChange};
+use touchup_session::session::{Removal, StrokeChange};
 
 /// Answer to calls.
 pub(in crate::node) const REPLAYED: &str =
@@ -87,13 +87,8 @@ impl RefinementWorker {
             .map_err(|error| error.to_string())?
             .ok_or(NO_PATCH)?;
         let (recording, topics) = replayed.recording();
-        let source = EvidenceSource {
-            recording,
-            topics,
-            placement: self.setup.input.scene.placement(),
-            sync: self.setup.input.scene.sync_params(),
-            until_ns: removal.after_ns,
-        };
+        let scene = &self.setup.input.scene;
+        let source = recorded_evidence(recording, topics, scene, removal.after_ns);
         let evidence = source
             .replayed(&replayed.changes_so_far(), replay)
             .map_err(|error| error.to_string())?;

@@ -13,12 +13,12 @@ use super::replayed::REPLAYED;
 use crate::node::refinement::RefinementWorker;
 use crate::node::take_out::{
     BUSY, MOST_ASKED, NO_PATCH, NOTHING_TOUCHED, READ_WAIT, Remade, TakingOut, WantedTouch,
-    answer_of, counted_contacts, named, read, refused, touch_of, touches_of,
+    answer_of, counted_contacts, named, read, recorded_evidence, refused, touch_of, touches_of,
 };
 use crate::ros::messages::{TakeOutTouchRequest, TakeOutTouchResponse};
 use crate::ros::port::Reply;
 use touchup_method::reconstruct::{Patcher, StrokeSpan};
-use touchup_session::session::{EvidenceSource, Removal, StrokeChange, StrokeChanges};
+use touchup_session::session::{Removal, StrokeChange, StrokeChanges};
 
 /// Reason why a touch stays: samples dropped meanwhile would change the other touches.
 fn too_many(dropped: u64) -> String {
@@ -173,11 +173,7 @@ impl RefinementWorker {
         if self.side_work.count() >= MOST_ASKED {
             return Err(BUSY.to_owned());
         }
-        let out = request
-            .put_back
-            .then(|| self.taken_out(request))
-            .transpose()?;
-        let wanted = out.is_none().then(|| self.wanted(request)).transpose()?;
+        let (out, wanted) = self.sought(request)?;
         let (copy, setup) = (self.copied_evidence()?, Arc::clone(&self.setup));
         let (version, until_ns) = (
             self.session.version,
@@ -198,7 +194,6 @@ impl RefinementWorker {
     }
 
     /// Returns a function that recomputes the evidence with or without the touch.
-    #[expect(clippy::too_many_lines)]
     fn remaking(
         &mut self,
         request: &TakeOutTouchRequest,
@@ -210,11 +205,7 @@ impl RefinementWorker {
             return Err(fault.clone());
         }
         self.check_recorded()?;
-        let out = request
-            .put_back
-            .then(|| self.taken_out(request))
-            .transpose()?;
-        let wanted = out.is_none().then(|| self.wanted(request)).transpose()?;
+        let (out, wanted) = self.sought(request)?;
         let until_ns = self.session.last_ns.ok_or(NOTHING_TOUCHED)?;
         let copy = out.is_none().then(|| self.copied_evidence()).transpose()?;
         let replay = self
@@ -236,47 +227,31 @@ impl RefinementWorker {
                 touch_of(patcher, wanted.as_ref(), until_ns)
             });
             read(setup.clock.recv_timeout(&flushed, READ_WAIT))?;
-            let source = EvidenceSource {
-                recording: &recording,
-                topics: &setup.topics,
-                placement: setup.input.scene.placement(),
-                sync: setup.input.scene.sync_params(),
-                until_ns,
-            };
-            let remade = |change| {
-                changes.push(change);
-                source
-                    .replayed(&changes, replay)
-                    .map_err(|error| error.to_string())
-            };
-            Ok(match (found.transpose()?, out) {
-                (Some((span, touches)), _) => {
-                    let change = StrokeChange::TakeOut(Removal {
-                        after_ns: until_ns,
-                        stroke: span,
-                    });
-                    let message = format!("took out 1 touch: {}", counted_contacts(touches.len()));
-                    Remade {
-                        evidence: remade(change)?,
-                        change,
-                        answer: answer_of(span, &touches, message),
-                    }
-                }
-                (None, Some(span)) => {
-                    let change = StrokeChange::PutBack(Removal {
-                        after_ns: until_ns,
-                        stroke: span,
-                    });
-                    let evidence = remade(change)?;
-                    let touches = touches_of(evidence.patcher(), span);
-                    let message = format!("put back 1 touch: {}", counted_contacts(touches.len()));
-                    Remade {
-                        evidence,
-                        change,
-                        answer: answer_of(span, &touches, message),
-                    }
-                }
+            let scene = &setup.input.scene;
+            let source = recorded_evidence(&recording, &setup.topics, scene, until_ns);
+            let (stroke, touches) = match (found.transpose()?, out) {
+                (Some((span, touches)), _) => (span, Some(touches)),
+                (None, Some(span)) => (span, None),
                 (None, None) => return Err(NOTHING_TOUCHED.to_owned()),
+            };
+            let removal = Removal {
+                after_ns: until_ns,
+                stroke,
+            };
+            let (change, done) = match touches {
+                Some(_) => (StrokeChange::TakeOut(removal), "took out"),
+                None => (StrokeChange::PutBack(removal), "put back"),
+            };
+            changes.push(change);
+            let evidence = source
+                .replayed(&changes, replay)
+                .map_err(|error| error.to_string())?;
+            let touches = touches.unwrap_or_else(|| touches_of(evidence.patcher(), stroke));
+            let message = format!("{done} 1 touch: {}", counted_contacts(touches.len()));
+            Ok(Remade {
+                evidence,
+                change,
+                answer: answer_of(stroke, &touches, message),
             })
         })
     }
@@ -304,6 +279,18 @@ impl RefinementWorker {
                 ))
             }
         }
+    }
+
+    /// The stroke to restore, or else the touch to find.
+    fn sought(
+        &self,
+        request: &TakeOutTouchRequest,
+    ) -> Result<(Option<StrokeSpan>, Option<WantedTouch>), String> {
+        Ok(if request.put_back {
+            (Some(self.taken_out(request)?), None)
+        } else {
+            (None, Some(self.wanted(request)?))
+        })
     }
 
     fn wanted(&self, request: &TakeOutTouchRequest) -> Result<WantedTouch, String> {

@@ -14,8 +14,19 @@ const NEAR: f64 = 0.05;
 /// Height of the text above the labels of features, m.
 const TEXT_HEIGHT: f64 = 12e-3;
 
+/// Length of the arrow to the next touch, m.
+const NEXT_LENGTH: f64 = 10e-3;
+
+const BALL_COLOR: ColorRGBA = color([0.9, 0.3, 0.2, 0.9]);
+const TEXT_COLOR: ColorRGBA = color([1.0, 0.95, 0.4, 1.0]);
+const CLOSEST_COLOR: ColorRGBA = color([0.9, 0.9, 0.2, 0.9]);
+const NEXT_COLOR: ColorRGBA = color([0.2, 0.9, 0.4, 1.0]);
+
+const fn color([r, g, b, a]: [f32; 4]) -> ColorRGBA {
+    ColorRGBA { r, g, b, a }
+}
+
 /// Markers of the tip: ball, text, the arrow to the mesh, and the arrow to the next touch.
-#[expect(clippy::too_many_lines)]
 pub fn markers(
     tip: &LastTip,
     features: &FeatureArray,
@@ -23,124 +34,87 @@ pub fn markers(
     frame: &str,
 ) -> MarkerArray {
     let nearest = nearest(tip, features);
-    let base = Marker {
-        header: header(tip.stamp_ns, frame),
-        ns: "tip".to_owned(),
-        ..Marker::default()
-    };
-    let red = ColorRGBA {
-        r: 0.9,
-        g: 0.3,
-        b: 0.2,
-        a: 0.9,
-    };
+    let next = nearest.and_then(|feature| next.get(&feature.id));
+    let base = |id| tip_marker(tip.stamp_ns, frame, id);
     let ball = ball(
         point(&tip.centre),
         2.0 * tip.radius.max(0.5e-3),
         Marker {
-            color: red,
-            ..base.clone()
+            color: BALL_COLOR,
+            ..base(0)
         },
     );
     let mut place = tip.centre;
     place.z += TEXT_HEIGHT;
-    let words = text(
-        tip,
-        nearest,
-        nearest.is_some_and(|feature| next.contains_key(&feature.id)),
-    );
-    let yellow = ColorRGBA {
-        r: 1.0,
-        g: 0.95,
-        b: 0.4,
-        a: 1.0,
-    };
-    let text = letters(
-        &place,
-        words,
-        yellow,
-        Marker {
-            id: 1,
-            ..base.clone()
-        },
-    );
-    let arrow = |id, drawn: Option<([f64; 2], ColorRGBA, [Point3<f64>; 2])>| {
-        let arrow = Marker {
-            id,
-            r#type: Marker::ARROW,
-            ..base.clone()
-        };
-        match drawn {
-            Some(([x, y], color, ends)) => Marker {
-                scale: Vector3 { x, y, z: 0.0 },
-                color,
-                points: ends.iter().map(point).collect(),
-                ..arrow
-            },
-            None => Marker {
-                action: Marker::DELETE,
-                ..arrow
-            },
-        }
-    };
+    let words = text(tip, nearest, next.is_some());
+    let text = letters(&place, words, TEXT_COLOR, base(1));
     // at the surface it would hide its target
     let closest = tip
         .closest
         .filter(|(_, distance)| *distance > tip.radius)
-        .map(|(closest, _)| {
-            (
-                [0.5e-3, 1.2e-3],
-                ColorRGBA {
-                    r: 0.9,
-                    g: 0.9,
-                    b: 0.2,
-                    a: 0.9,
-                },
-                [tip.centre, closest],
-            )
-        });
+        .map(|(closest, _)| [tip.centre, closest]);
     // towards the position from outside; without a known outside, from the tip
-    let there =
-        nearest
-            .and_then(|feature| next.get(&feature.id))
-            .map(|NextTouch { place, normal }| {
-                let from = if *normal == nalgebra::Vector3::zeros() {
-                    tip.centre
-                } else {
-                    place + normal * NEXT_LENGTH
-                };
-                (
-                    [1.2e-3, 3e-3],
-                    ColorRGBA {
-                        r: 0.2,
-                        g: 0.9,
-                        b: 0.4,
-                        a: 1.0,
-                    },
-                    [from, *place],
-                )
-            });
+    let next = next.map(|NextTouch { place, normal }| {
+        let from = if *normal == nalgebra::Vector3::zeros() {
+            tip.centre
+        } else {
+            place + normal * NEXT_LENGTH
+        };
+        [from, *place]
+    });
+    let closest = arrow([0.5e-3, 1.2e-3], CLOSEST_COLOR, closest, base(2));
+    let next = arrow([1.2e-3, 3e-3], NEXT_COLOR, next, base(3));
     MarkerArray {
-        markers: vec![ball, text, arrow(2, closest), arrow(3, there)],
+        markers: vec![ball, text, closest, next],
+    }
+}
+
+/// Arrow between two points; deletes it without them.
+///
+/// - `[x, y]`: diameters of shaft and head, m.
+fn arrow(
+    [x, y]: [f64; 2],
+    color: ColorRGBA,
+    ends: Option<[Point3<f64>; 2]>,
+    base: Marker,
+) -> Marker {
+    let arrow = Marker {
+        r#type: Marker::ARROW,
+        ..base
+    };
+    match ends {
+        Some(ends) => Marker {
+            scale: Vector3 { x, y, z: 0.0 },
+            color,
+            points: ends.iter().map(point).collect(),
+            ..arrow
+        },
+        None => Marker {
+            action: Marker::DELETE,
+            ..arrow
+        },
+    }
+}
+
+fn tip_marker(stamp_ns: i64, frame: &str, id: i32) -> Marker {
+    Marker {
+        header: header(stamp_ns, frame),
+        ns: "tip".to_owned(),
+        id,
+        ..Marker::default()
     }
 }
 
 /// Deletes all of [`markers`].
 pub fn no_markers(frame: &str) -> MarkerArray {
     let gone = |id| Marker {
-        header: header(0, frame),
-        ns: "tip".to_owned(),
-        id,
         action: Marker::DELETE,
-        ..Marker::default()
+        ..tip_marker(0, frame, id)
     };
     MarkerArray {
         markers: (0..4).map(gone).collect(),
     }
 }
-
-/// Length of the arrow to the next touch, m.
-const NEXT_LENGTH: f64 = 10e-3;
 
 /// The feature of interest to the operator.
 fn nearest<'a>(tip: &LastTip, features: &'a FeatureArray) -> Option<&'a Feature> {

@@ -17,7 +17,7 @@ use serde::Deserialize;
 use serde_json::json;
 
 use super::access::{Access, Role};
-use crate::page::page::PAGE;
+use crate::page::built_page::PAGE;
 
 /// The page loads nothing from elsewhere, and no other page may frame it.
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; connect-src 'self'; \

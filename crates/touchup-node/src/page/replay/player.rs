@@ -26,6 +26,7 @@ use crate::ros::parameters::CELL_FRAME;
 use crate::ros::parameters::{ParameterValue, Parameters};
 use crate::ros::port::{Arrival, ReplayStep, SamplePort};
 use crate::ros::{as_pose, as_wrench};
+use touchup_io::mesh_file::MeshUnit;
 use touchup_io::session_folder::SessionFolder;
 use touchup_method::stylus::Message;
 use touchup_session::clock::Clock;
@@ -92,14 +93,9 @@ impl Player {
     }
 
     /// Reads the session, and starts its node.
-    #[expect(clippy::too_many_lines)]
     fn open(&self) -> Result<ReplayStage, String> {
         let Self {
-            folder,
-            session_folder,
-            entrance,
-            control,
-            ..
+            folder, control, ..
         } = self;
         let record = SessionRecord::open(folder.path()).map_err(|error| error.to_string())?;
         let SessionRecord {
@@ -124,21 +120,19 @@ impl Player {
         // missing
         let changes =
             SessionRecord::strokes_of(folder.path()).map_err(|error| error.to_string())?;
-        let parameters = [
+        let text = |text: &str| ParameterValue::String(text.to_owned());
+        let mut parameters = Parameters::default();
+        for (name, value) in [
             ("scene", path(&scene)?),
             ("scan", path(&scan)?),
-            (
-                "mesh_unit",
-                ParameterValue::String(mesh_unit.name().to_owned()),
-            ),
-            ("source", ParameterValue::String(source.to_owned())),
-        ];
-        let mut all = Parameters::default();
-        for (name, value) in parameters {
-            all.set(name, &value).map_err(|error| error.to_string())?;
+            ("mesh_unit", text(mesh_unit.name())),
+            ("source", text(source)),
+        ] {
+            let set = parameters.set(name, &value);
+            set.map_err(|error| error.to_string())?;
         }
         let ready = PreparedNode::replayed(
-            all,
+            parameters,
             folder.clone(),
             ReplayedSession::new(recording, topics, changes),
         )
@@ -146,31 +140,7 @@ impl Player {
         let clock = Clock::system();
         let (inbox, arrivals) = inbox(INBOX, &clock);
         let (network, stylus) = in_process::start_unread(inbox.clone(), &clock);
-        let scan_mesh = ready.scan_mesh();
-        let file = scan
-            .file_name()
-            .map(|name| name.to_string_lossy().into_owned())
-            .unwrap_or_default();
-        let site = Arc::new(Site {
-            board: Board::default(),
-            mesh: ready.mesh_feed(),
-            calls: Calls::new(&inbox).map_err(|error| error.to_string())?,
-            inbox: inbox.clone(),
-            entrance: Arc::clone(entrance),
-            // none are read: a replay detects features anew, perhaps with other numbers
-            annotations: Annotations::new(session_folder),
-            nominal: None,
-            reports: Reports::new(None, mesh_unit),
-            scan: ScanShown {
-                file,
-                faces: scan_mesh.0.face_count(),
-                is_size_confirmed: true,
-            },
-            scan_mesh,
-            session_folder: session_folder.clone(),
-            pages: AtomicUsize::new(0),
-            replay: Some(Arc::clone(control)),
-        });
+        let site = self.site(&ready, &inbox, &scan, mesh_unit)?;
         let port = Arc::new(PagePort {
             network,
             site: Arc::clone(&site),
@@ -186,6 +156,41 @@ impl Player {
             stylus,
             node,
         })
+    }
+
+    /// The content of the page.
+    fn site(
+        &self,
+        ready: &PreparedNode,
+        inbox: &Inbox,
+        scan: &Path,
+        mesh_unit: MeshUnit,
+    ) -> Result<Arc<Site>, String> {
+        let scan_mesh = ready.scan_mesh();
+        let file = scan
+            .file_name()
+            .map(|name| name.to_string_lossy().into_owned())
+            .unwrap_or_default();
+        Ok(Arc::new(Site {
+            board: Board::default(),
+            mesh: ready.mesh_feed(),
+            calls: Calls::new(inbox).map_err(|error| error.to_string())?,
+            inbox: inbox.clone(),
+            entrance: Arc::clone(&self.entrance),
+            // none are read: a replay detects features anew, perhaps with other numbers
+            annotations: Annotations::new(&self.session_folder),
+            nominal: None,
+            reports: Reports::new(None, mesh_unit),
+            scan: ScanShown {
+                file,
+                faces: scan_mesh.0.face_count(),
+                is_size_confirmed: true,
+            },
+            scan_mesh,
+            session_folder: self.session_folder.clone(),
+            pages: AtomicUsize::new(0),
+            replay: Some(Arc::clone(&self.control)),
+        }))
     }
 }
 

@@ -38,6 +38,22 @@ pub(super) struct CalibrateRequest {
     points: Option<String>,
 }
 
+impl CalibrateRequest {
+    /// The file that stands for the calibration, if the files fit its kind.
+    fn file(&self) -> Result<&String, &'static str> {
+        match (self.what, &self.recording, &self.points) {
+            (CalibrationKind::Scan, _, None) => {
+                Err("name a table of the points that were picked on the scan")
+            }
+            (CalibrationKind::Scan, recording, Some(points)) => {
+                Ok(recording.as_ref().unwrap_or(points))
+            }
+            (_, Some(recording), None) => Ok(recording),
+            _ => Err("name a recording that was made for this calibration, and nothing else"),
+        }
+    }
+}
+
 /// The files and the scene of a calibration.
 struct CalibrationInputs {
     what: CalibrationKind,
@@ -51,7 +67,6 @@ impl NodeSetup {
     ///
     /// # Errors
     /// [`NodeSetupError`]
-    #[expect(clippy::too_many_lines)]
     pub(super) fn calibrate(
         self: &Arc<Self>,
         request: &CalibrateRequest,
@@ -62,17 +77,7 @@ impl NodeSetup {
             points,
         } = request;
         let what = *what;
-        let file = match (what, recording, points) {
-            (CalibrationKind::Scan, _, None) => {
-                Err("name a table of the points that were picked on the scan")
-            }
-            (CalibrationKind::Scan, recording, Some(points)) => {
-                Ok(recording.as_ref().unwrap_or(points))
-            }
-            (_, Some(recording), None) => Ok(recording),
-            _ => Err("name a recording that was made for this calibration, and nothing else"),
-        };
-        let file = file.map_err(NodeSetupError::refused)?.clone();
+        let file = request.file().map_err(NodeSetupError::refused)?.clone();
         let place = |name: &Option<String>, kind| {
             let place = name
                 .as_ref()
@@ -82,25 +87,9 @@ impl NodeSetup {
         };
         let points = place(points, FolderFileKind::PointTable)?;
         let recording = place(recording, FolderFileKind::Recording)?;
-        let scene = {
-            let mut state = self.idle()?;
-            self.take_edits(&mut state)?;
-            // the ball is needed to find dwells on points
-            if what == CalibrationKind::Scan && recording.is_some() && !state.has_tip() {
-                return Err(NO_TIP);
-            }
-            let text = state
-                .draft
-                .with(state.tip, None)
-                .map_err(NodeSetupError::refused)?;
-            let scene = Scene::from_yaml(&text).map_err(NodeSetupError::refused)?;
-            state.calibration = CalibrationChoice::Running {
-                what,
-                file: file.clone(),
-                share: None,
-            };
-            scene
-        };
+        // the ball is needed to find dwells on points
+        let needs_tip = what == CalibrationKind::Scan && recording.is_some();
+        let scene = self.begin_calibration(what, &file, needs_tip)?;
         let (setup, inputs) = (
             Arc::clone(self),
             CalibrationInputs {
@@ -134,6 +123,31 @@ impl NodeSetup {
         };
         beside("setup-calibration", "calibrating", calibrate)
             .inspect_err(|_| locked(&self.state).calibration = CalibrationChoice::None)
+    }
+
+    /// Shows a calibration as running; returns its scene.
+    fn begin_calibration(
+        &self,
+        what: CalibrationKind,
+        file: &str,
+        needs_tip: bool,
+    ) -> Result<Scene, NodeSetupError> {
+        let mut state = self.idle()?;
+        self.take_edits(&mut state)?;
+        if needs_tip && !state.has_tip() {
+            return Err(NO_TIP);
+        }
+        let text = state
+            .draft
+            .with(state.tip, None)
+            .map_err(NodeSetupError::refused)?;
+        let scene = Scene::from_yaml(&text).map_err(NodeSetupError::refused)?;
+        state.calibration = CalibrationChoice::Running {
+            what,
+            file: file.to_owned(),
+            share: None,
+        };
+        Ok(scene)
     }
 
     /// Writes the result of a calibration to the scene.

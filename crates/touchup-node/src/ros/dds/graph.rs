@@ -225,7 +225,6 @@ impl DdsGraph {
         vendor.map(|(_, vendor)| *vendor)
     }
 
-    #[expect(clippy::too_many_lines)]
     fn on(&mut self, event: Event) {
         self.remember(&event);
         if let Event::RemoteWriterMatched {
@@ -265,16 +264,7 @@ impl DdsGraph {
                 local_reader: local,
                 remote_writer: remote,
             } => {
-                let is_new = self
-                    .matched
-                    .get_mut(&local)
-                    .is_some_and(|(_, others)| others.insert(remote));
-                if is_new {
-                    self.report(local, None);
-                }
-                if let Some((service, what)) = self.callers.get(&remote) {
-                    tracing::info!(service, "{what}");
-                }
+                self.note_match(local, remote);
             }
             Event::ReaderLost { guid, .. } | Event::WriterLost { guid, .. } => {
                 self.reported.remove(&guid);
@@ -282,34 +272,31 @@ impl DdsGraph {
                 self.unmatch(|other| *other == guid);
             }
             Event::RemoteReaderQosIncompatible {
-                local_writer,
+                local_writer: local,
+                remote_reader: remote,
                 requested_qos,
                 offered_qos,
-                remote_reader,
-            } => {
-                self.misfit(
-                    local_writer,
-                    remote_reader,
-                    &requested_qos,
-                    &offered_qos,
-                    "a listener",
-                );
-            }
+            } => self.misfit(local, remote, &requested_qos, &offered_qos, "a listener"),
             Event::RemoteWriterQosIncompatible {
-                local_reader,
+                local_reader: local,
+                remote_writer: remote,
                 requested_qos,
                 offered_qos,
-                remote_writer,
-            } => {
-                self.misfit(
-                    local_reader,
-                    remote_writer,
-                    &requested_qos,
-                    &offered_qos,
-                    "a sender",
-                );
-            }
+            } => self.misfit(local, remote, &requested_qos, &offered_qos, "a sender"),
             _ => {}
+        }
+    }
+
+    fn note_match(&mut self, local: GUID, remote: GUID) {
+        let is_new = self
+            .matched
+            .get_mut(&local)
+            .is_some_and(|(_, others)| others.insert(remote));
+        if is_new {
+            self.report(local, None);
+        }
+        if let Some((service, what)) = self.callers.get(&remote) {
+            tracing::info!(service, "{what}");
         }
     }
 

@@ -88,7 +88,6 @@ impl Drop for DdsConnection {
 ///
 /// # Errors
 /// [`RosError`]: an invalid name, no network, no thread.
-#[expect(clippy::too_many_lines)]
 pub fn start(config: &NodeConfig, inbox: Inbox) -> Result<Arc<dyn Port>, RosError> {
     let exchange = PortState::new(config, inbox);
     // the library's parameter services know only one mapping, and no ranges
@@ -112,15 +111,7 @@ pub fn start(config: &NodeConfig, inbox: Inbox) -> Result<Arc<dyn Port>, RosErro
     subscribe(config, &mut back_end)?;
     crate::ros::services::serve(&mut back_end, &Arc::new(exchange.inbox.clone()))?;
     locked(&back_end.graph).services = back_end.names.clone();
-    let announce = back_end.begun.clone();
-    let announce = move |name: &str, value: &ParameterValue| {
-        if let Some(Err(reason)) = announce
-            .get()
-            .map(|node| locked(node).set_parameter(name, native(value)))
-        {
-            tracing::warn!(name, reason, "a change of a parameter is not announced");
-        }
-    };
+    let announce = announcement(back_end.begun.clone());
     parameter_services::serve(
         &mut back_end,
         &PublicParameters::new(&exchange, &config.parameters, announce),
@@ -152,6 +143,18 @@ pub fn start(config: &NodeConfig, inbox: Inbox) -> Result<Arc<dyn Port>, RosErro
         exchange,
         _connection: connection,
     }))
+}
+
+/// Announces the changes of a parameter once the node has begun.
+fn announcement(begun: BegunNode) -> impl Fn(&str, &ParameterValue) {
+    move |name, value| {
+        let set = begun
+            .get()
+            .map(|node| locked(node).set_parameter(name, native(value)));
+        if let Some(Err(reason)) = set {
+            tracing::warn!(name, reason, "a change of a parameter is not announced");
+        }
+    }
 }
 
 /// Declares the values to ros2-client, so that it announces their changes on `/parameter_events`.

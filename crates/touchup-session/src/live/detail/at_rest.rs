@@ -194,7 +194,6 @@ impl AtRest {
     }
 
     /// Takes a step, and notes its reverse.
-    #[expect(clippy::too_many_lines)]
     fn take_step(
         &mut self,
         step: Step,
@@ -204,95 +203,81 @@ impl AtRest {
     ) -> Result<(), MeshError> {
         let back = match step {
             Step::Park(face) => {
-                let shown =
-                    std::mem::replace(&mut followed.shown[face.0 as usize], FaceShown::Gone);
-                if let FaceShown::Same(same) = shown {
-                    followed.mesh.remove_face(same);
-                }
-                Step::Follow(face)
+                followed.park(face);
+                Some(Step::Follow(face))
             }
             Step::BringBack(detail) => {
                 followed.bring_back(scans, detail)?;
-                Step::Hide(detail)
+                Some(Step::Hide(detail))
             }
             Step::PutBack(cell) => {
-                for &vertex in followed.vertices.of(cell) {
-                    let (vertex, place) =
-                        (VertexId(vertex), scans.original.position(VertexId(vertex)));
-                    if followed.mesh.position(vertex) != place {
-                        followed.mesh.set_position(vertex, place);
-                    }
-                }
-                followed.moved.remove(&cell);
-                Step::Carry(cell)
+                followed.put_back(scans.original, cell);
+                Some(Step::Carry(cell))
             }
             Step::Forget(vertex) => {
                 followed.remove(vertex);
-                return Ok(());
+                None
             }
-            Step::Place(at) => {
-                let vertex = self.patch.vertices[at as usize];
-                if let VertexKey::Scan(moved) = vertex.key {
-                    self.placed.push(moved);
-                    if vertex.support != Support::Scan {
-                        self.support.insert(moved, vertex.support);
-                    }
-                    if followed.mesh.position(moved) == vertex.position {
-                        return Ok(());
-                    }
-                    followed.mesh.set_position(moved, vertex.position);
-                    Step::Return(moved)
-                } else {
-                    let placed = followed.mesh.add_vertex(vertex.position)?;
-                    self.placed.push(placed);
-                    self.support.insert(placed, vertex.support);
-                    Step::Unplace(placed)
-                }
-            }
+            Step::Place(at) => self.place(at, &mut followed.mesh)?,
             Step::Cut(face) => {
                 remove_from(&mut followed.mesh, &mut followed.returned, face);
-                Step::Restore(face)
+                Some(Step::Restore(face))
             }
             Step::Fill(face) => {
                 let Self { patch, placed, .. } = &*self;
                 let corners = patch.faces[face as usize].map(|corner| placed[corner as usize]);
-                Step::Empty(followed.mesh.add_face(corners)?)
+                Some(Step::Empty(followed.mesh.add_face(corners)?))
             }
             Step::Follow(face) => return followed.follow_face(scans, working, face),
             Step::Hide(detail) => {
                 followed.hide(scans, detail);
-                return Ok(());
+                None
             }
             Step::Carry(cell) => {
                 followed.moving.insert(cell);
-                return Ok(());
+                None
             }
             Step::Return(vertex) => {
                 self.support.remove(&vertex);
-                followed
-                    .mesh
-                    .set_position(vertex, scans.original.position(vertex));
-                return Ok(());
+                let place = scans.original.position(vertex);
+                followed.mesh.set_position(vertex, place);
+                None
             }
             Step::Unplace(vertex) => {
                 self.support.remove(&vertex);
                 followed.mesh.remove_vertex(vertex);
-                return Ok(());
+                None
             }
             Step::Restore(face) => {
-                return return_to(
-                    &mut followed.mesh,
-                    &mut followed.returned,
-                    scans.original,
-                    face,
-                );
+                let FollowedScan { mesh, returned, .. } = followed;
+                return return_to(mesh, returned, scans.original, face);
             }
             Step::Empty(face) => {
                 followed.mesh.remove_face(face);
-                return Ok(());
+                None
             }
         };
-        self.back.push(back);
+        self.back.extend(back);
         Ok(())
+    }
+
+    /// Places a vertex of the patch; returns the reverse, if there is anything to reverse.
+    fn place(&mut self, at: u32, mesh: &mut TriMesh) -> Result<Option<Step>, MeshError> {
+        let vertex = self.patch.vertices[at as usize];
+        let VertexKey::Scan(moved) = vertex.key else {
+            let placed = mesh.add_vertex(vertex.position)?;
+            self.placed.push(placed);
+            self.support.insert(placed, vertex.support);
+            return Ok(Some(Step::Unplace(placed)));
+        };
+        self.placed.push(moved);
+        if vertex.support != Support::Scan {
+            self.support.insert(moved, vertex.support);
+        }
+        if mesh.position(moved) == vertex.position {
+            return Ok(None);
+        }
+        mesh.set_position(moved, vertex.position);
+        Ok(Some(Step::Return(moved)))
     }
 }

@@ -237,6 +237,26 @@ impl FollowedScan {
         is_removed
     }
 
+    /// Removes the shown face of a face that the working mesh shares with the scan.
+    pub fn park(&mut self, face: FaceId) {
+        let shown = std::mem::replace(&mut self.shown[face.0 as usize], FaceShown::Gone);
+        if let FaceShown::Same(same) = shown {
+            self.mesh.remove_face(same);
+        }
+    }
+
+    /// Moves the vertices of a cell to their positions in the scan.
+    pub fn put_back(&mut self, scan: &TriMesh, cell: u32) {
+        for &vertex in self.vertices.of(cell) {
+            let vertex = VertexId(vertex);
+            let place = scan.position(vertex);
+            if self.mesh.position(vertex) != place {
+                self.mesh.set_position(vertex, place);
+            }
+        }
+        self.moved.remove(&cell);
+    }
+
     pub fn hide(&mut self, scans: Scans<'_>, detail: FaceId) {
         self.part(scans, detail);
         for &face in &self.parts[detail.0 as usize] {

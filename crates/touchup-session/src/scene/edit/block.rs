@@ -27,7 +27,6 @@ pub(super) fn set(text: &str, path: &[&str], value: &str, remark: &str) -> Optio
 }
 
 /// Sets the value in the mapping of the lines of `range`, with keys at `indent`.
-#[expect(clippy::too_many_lines)]
 fn set_in(
     lines: &[&str],
     range: Range<usize>,
@@ -41,23 +40,14 @@ fn set_in(
         .clone()
         .find(|&at| key_end(lines[at], indent, first).is_some())
     else {
-        let is_root = range.start == 0 && indent == 0 && range.end == lines.len();
-        let at = if is_root {
-            lines.len()
-        } else {
-            end_of(lines, range, indent)
-        };
-        return Some(inserted(
-            lines,
-            at,
-            &new_lines(indent, path, value, remark, is_root && at > 0),
-        ));
+        return Some(with_key(lines, range, indent, path, value, remark));
     };
     let behind = key_end(lines[key_line], indent, first)?;
     let body = key_line + 1..body_end(lines, key_line + 1..range.end, indent);
     let (inline, comment) = split_comment(&lines[key_line][behind..]);
     if rest.is_empty() {
         let kept: String = body
+            .clone()
             .map(|at| lines[at])
             .filter(|line| !is_content(line))
             .collect();
@@ -68,8 +58,7 @@ fn set_in(
             format!("  {comment}")
         };
         let line = format!("{} {value}{comment}\n", &lines[key_line][..behind]);
-        let after = body_end(lines, key_line + 1..range.end, indent);
-        return Some(lines[..key_line].concat() + &line + &kept + &lines[after..].concat());
+        return Some(lines[..key_line].concat() + &line + &kept + &lines[body.end..].concat());
     }
     if inline.starts_with('{') {
         let before: usize = lines[..key_line].iter().map(|line| line.len()).sum();
@@ -100,6 +89,25 @@ fn set_in(
         }
         _ => None,
     }
+}
+
+/// The text with a new key in the mapping of the lines of `range`.
+fn with_key(
+    lines: &[&str],
+    range: Range<usize>,
+    indent: usize,
+    path: &[&str],
+    value: &str,
+    remark: &str,
+) -> String {
+    let is_root = range.start == 0 && indent == 0 && range.end == lines.len();
+    let at = if is_root {
+        lines.len()
+    } else {
+        end_of(lines, range, indent)
+    };
+    let new = new_lines(indent, path, value, remark, is_root && at > 0);
+    inserted(lines, at, &new)
 }
 
 /// Line for a new key of the mapping in `range`: after its last line, including comments at the
