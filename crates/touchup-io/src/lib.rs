@@ -1,5 +1,16 @@
 //! Mesh files, recordings and picked points: with the scene file the only code that touches the
 //! disk.
+//!
+//! | module | files |
+//! |---|---|
+//! | [`mesh_file`] | meshes and point clouds: PLY, STL, OBJ, PCD, XYZ, E57 |
+//! | [`recording`] | recordings of poses and wrenches: MCAP, rosbag2, ROS 1 bags, tables |
+//! | [`tables`] | tables of text: picked points, static poses |
+//! | [`features_file`], [`touches_file`], [`probed_touches_file`], [`result_table`] | measured features and touches |
+//! | [`nominal_file`], [`inspection_file`], [`qif_file`] | drawings, and inspections against them |
+//! | [`scan_folder`], [`session_folder`], [`result_folder`] | folders of scans, sessions and results |
+//! | [`urdf`], [`parameters_file`], [`json_lines`], [`text_file`], [`png`](mod@png) | an arm, ROS parameters, records, texts, pictures |
+//! | [`atomic`], [`content_hash`], [`file_error`], [`machine`] | whole files, their content as a number, their errors, the machine |
 #![cfg_attr(not(test), warn(clippy::unwrap_used))]
 
 /// Declares a report's struct and its constructor, a field at a time: name with unit, type, and

@@ -3,6 +3,14 @@
 //! A [`Surface`] has a signed distance at every point. The scanner makes a bad mesh of one, the
 //! stylus slides a ball over it and records its contacts ([`touch`]). All randomness comes from a
 //! seed.
+//!
+//! | files | content |
+//! |---|---|
+//! | `surfaces/` | known surfaces and their triangles |
+//! | `paths/` | paths of the hand over a part |
+//! | `scanner`, `stylus`, `sensor`, `markers`, `arm` | instruments, with the errors of real ones |
+//! | `tip`, `ball`, `bending`, `coupled` | mechanics of a tip on a surface |
+//! | `world`, `mistake` | drawn worlds with their calibration; mistakes that a check must name |
 #![cfg_attr(not(test), warn(clippy::unwrap_used))]
 
 #[macro_use]

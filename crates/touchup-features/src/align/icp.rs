@@ -152,12 +152,12 @@ const ROUNDING: f64 = 1e-11;
 /// ```
 /// use nalgebra::{Isometry3, Point3};
 /// use touchup_features::align::{IcpParams, icp};
-/// use touchup_geometry::mesh::{Alone, FaceTree, TriMesh};
+/// use touchup_geometry::mesh::{SerialWorkers, FaceTree, TriMesh};
 /// let p = |x, y| Point3::new(x, y, 0.0);
 /// let square = TriMesh::new(vec![p(0., 0.), p(1., 0.), p(1., 1.), p(0., 1.)], vec![[0, 1, 2], [0, 2, 3]])?;
 /// let above: Vec<_> = (0..100).map(|i| Point3::new(0.1 * f64::from(i % 10), 0.1 * f64::from(i / 10), 0.02)).collect();
 /// let tree = FaceTree::new(&square);
-/// let fit = icp(&above, &square, &tree, &Isometry3::identity(), &IcpParams::default(), &Alone)?;
+/// let fit = icp(&above, &square, &tree, &Isometry3::identity(), &IcpParams::default(), &SerialWorkers)?;
 /// assert!((fit.source_to_target.translation.z + 0.02).abs() < 1e-9);
 /// assert_eq!(fit.undetermined().count(), 3, "it slides in two directions, and turns");
 /// # Ok::<(), Box<dyn std::error::Error>>(())

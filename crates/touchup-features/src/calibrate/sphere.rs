@@ -53,7 +53,7 @@ const SEGMENTS: u32 = 48;
 /// let fit = fit_sphere(&touches.map(|out| middle + Vector3::from(out) * 0.014)).unwrap();
 /// assert!((fit.centre - middle).norm() < 1e-12 && (fit.radius - 0.014).abs() < 1e-12);
 /// ```
-pub(crate) fn fit_sphere(points: &[Point3<f64>]) -> Option<SphereFit> {
+pub fn fit_sphere(points: &[Point3<f64>]) -> Option<SphereFit> {
     let degrees_of_freedom = points.len().checked_sub(4).filter(|count| *count > 0)?;
     let mut centre = linear_centre(points)?;
     let mut radius = points.iter().map(|p| (p - centre).norm()).sum::<f64>() / points.len() as f64;

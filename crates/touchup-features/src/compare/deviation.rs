@@ -83,11 +83,11 @@ fn in_order(points: &[Point3<f64>]) -> Result<(Vec<u32>, Vec<Point3<f64>>), Comp
 /// ```
 /// use nalgebra::Point3;
 /// use touchup_features::compare::deviations;
-/// use touchup_geometry::mesh::{Alone, FaceTree, TriMesh};
+/// use touchup_geometry::mesh::{SerialWorkers, FaceTree, TriMesh};
 /// let p = |x, y| Point3::new(x, y, 0.0);
 /// let truth = TriMesh::new(vec![p(0.0, 0.0), p(1.0, 0.0), p(0.0, 1.0)], vec![[0, 1, 2]])?;
 /// let points = [Point3::new(0.2, 0.2, 0.5), Point3::new(0.2, 0.2, -0.25)];
-/// assert_eq!(deviations(&points, &truth, &FaceTree::new(&truth), &Alone)?, [0.5, -0.25]);
+/// assert_eq!(deviations(&points, &truth, &FaceTree::new(&truth), &SerialWorkers)?, [0.5, -0.25]);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn deviations(

@@ -101,7 +101,7 @@ impl BiasTracker {
     }
 
     /// Estimated reading of the sensor in free air, in the axes of T, N.
-    pub(crate) fn bias_t(&self) -> Vector3<f64> {
+    pub fn bias_t(&self) -> Vector3<f64> {
         self.bias_t
     }
 

@@ -262,7 +262,7 @@ impl Sample {
     /// Refuses an invalid measurement.
     ///
     /// # Errors
-    /// As [`StampedPose::check`] and [`StampedWrench::check`].
+    /// As `StampedPose::check` and `StampedWrench::check`.
     pub fn check(&self) -> Result<(), SampleError> {
         StampedPose {
             stamp_ns: self.stamp_ns,

@@ -64,7 +64,7 @@ const STILL: f64 = 1e-10;
 /// ```
 /// # use nalgebra::{Isometry3, Point3, Vector3};
 /// # use touchup_features::align::{DatumPair, fit_datums};
-/// # use touchup_features::features::Kind;
+/// # use touchup_features::features::FeatureKind;
 /// let pair = |kind, x: f64, y: f64| DatumPair {
 ///     kind,
 ///     nominal: Point3::new(x, y, 0.0),
@@ -74,7 +74,7 @@ const STILL: f64 = 1e-10;
 ///     place_std: 1e-5,
 ///     axis_std: Some(1e-3),
 /// };
-/// let pairs = [pair(Kind::Plane, 0.0, 0.0), pair(Kind::Hole, 0.01, 0.0), pair(Kind::Hole, 0.05, 0.03)];
+/// let pairs = [pair(FeatureKind::Plane, 0.0, 0.0), pair(FeatureKind::Hole, 0.01, 0.0), pair(FeatureKind::Hole, 0.05, 0.03)];
 /// let fit = fit_datums(&pairs, &[vec![0], vec![1], vec![2]], &Isometry3::identity())?;
 /// assert!((fit.motion.translation.vector - Vector3::new(-0.001, 0.0, 0.0)).norm() < 1e-9);
 /// # Ok::<(), touchup_features::align::DatumFitError>(())

@@ -60,7 +60,7 @@ pub(crate) type OdeState = [f64; 4];
 /// `relative` the error per step in units of it.
 ///
 /// # Errors
-/// [`DynamicsError::Stiff`] if [`MAX_STEPS`] do not suffice, [`DynamicsError::NotFinite`] if the
+/// [`DynamicsError::Stiff`] if `MAX_STEPS` do not suffice, [`DynamicsError::NotFinite`] if the
 /// rate is not.
 pub fn integrate(
     start: OdeState,

@@ -36,7 +36,7 @@ pub struct TouchFinderParams {
     /// minimum pause that separates streams, ns. Default 30 ms.
     pub largest_gap_ns: i64,
     /// cosine of the widest friction cone accepted; `None`: no friction estimate, the normal is the
-    /// force. Default [`WIDEST_CONE_COSINE`].
+    /// force. Default `WIDEST_CONE_COSINE`.
     pub cone_cosine: Option<f64>,
     /// residual uncertainty of the calibration; `None`: no uncertainty of contacts
     pub calibration: Option<CalibrationParams>,

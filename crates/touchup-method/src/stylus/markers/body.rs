@@ -14,7 +14,7 @@ const FLAT_SHARE: f64 = 0.02;
 
 /// The markers of a rigid body in the frame of the tip.
 ///
-/// Invariant: 3 to [`MOST_MARKERS`] markers, finite, distinct and not on one line.
+/// Invariant: 3 to `MOST_MARKERS` markers, finite, distinct and not on one line.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MarkerBody {
     markers_t: Vec<Point3<f64>>,
@@ -52,7 +52,7 @@ impl MarkerBody {
     /// - `markers_t`: by label from 0 on, m, in T.
     ///
     /// # Errors
-    /// [`SettingError`] for fewer than 3 or more than [`MOST_MARKERS`], markers at one place or on
+    /// [`SettingError`] for fewer than 3 or more than `MOST_MARKERS`, markers at one place or on
     /// one line, and values that are not finite.
     pub fn new(markers_t: Vec<Point3<f64>>) -> Result<Self, SettingError> {
         let count = markers_t.len();

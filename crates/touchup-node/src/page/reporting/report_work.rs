@@ -104,7 +104,7 @@ impl ReportWork {
         Ok(ReportFiles::in_folder(self.session.path()))
     }
 
-    fn write(&self, files: &ReportFiles) -> Result<(), InspectionError> {
+    fn write(&self, files: &ReportFiles) -> Result<(), Box<InspectionError>> {
         let folder = self.session.path();
         let source = if self.is_current {
             let [features, touches, mesh] = SAVED.map(|name| folder.join(name));
@@ -119,14 +119,11 @@ impl ReportWork {
             drawing.file.path = name_of(file.path());
         }
         let inspected = inspected(&source, &drawing, &self.params)?;
-        files.write(
-            &source,
-            &inspected,
-            &PartPicture {
-                mesh_unit: self.mesh_unit,
-                view: None,
-            },
-        )
+        let picture = PartPicture {
+            mesh_unit: self.mesh_unit,
+            view: None,
+        };
+        Ok(files.write(&source, &inspected, &picture)?)
     }
 
     /// Error text with the upload's original name.

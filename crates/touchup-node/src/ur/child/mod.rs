@@ -1,7 +1,7 @@
 //! The process that speaks to the arm, from the inside: the only place with Python.
 //!
-//! One thread owns `rtde_control` and executes the orders ([`control`]); a second one passes on the
-//! states of `rtde_receive` ([`states`]); a third reads the orders. After the loss of a connection
+//! One thread owns `rtde_control` and executes the orders (`control`); a second one passes on the
+//! states of `rtde_receive` (`states`); a third reads the orders. After the loss of a connection
 //! the process reports it and ends at once, as the library would reconnect by itself, and crash.
 
 mod control;
