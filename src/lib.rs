@@ -4,8 +4,7 @@
 //! touchup predicts the force that the scan implies, compares it with the measured force (the
 //! *haptic mismatch*), and moves the mesh until the two agree.
 //!
-//! This crate is the ROS 2 node and the command line; crates of their own hold the rest, shown here
-//! under one name:
+//! This crate is the command line; crates of their own hold the rest, shown here under one name:
 //!
 //! | crate | modules |
 //! |---|---|
@@ -16,8 +15,10 @@
 //! | [`touchup_sim`] | [`sim`]: known surfaces, a scanner, a stylus and an arm to test against |
 //! | [`touchup_io`] | [`io`]: mesh files, recordings, tables, pictures |
 //! | [`touchup_session`] | [`clock`], [`threads`], [`scan`], [`scene`], [`replay`], [`refinement`], [`probing_run`], [`calibration`], [`input_check`], [`live`], [`session`], [`sweep`] |
+//! | [`touchup_node`] | `ros` and `node` (features `ros` and `r2r`), `page` (feature `web`), `ros2_control`, `ur` (feature `ur`), [`log_lines`] |
+//! | `touchup-inspect` | a part against its drawing |
 //! | `touchup-report` | a separate program: error against run time, stability, and the cost of each part |
-//! | this one | `inspection`: a part against its drawing; `html`: text within pages; `ros`: the node (features `ros` and `r2r`); `ros2_control`: an arm behind it; `ur` (feature `ur`): a UR; [`cli`]: one file for each verb |
+//! | this one | [`cli`]: one file for each verb |
 #![cfg_attr(not(test), warn(clippy::unwrap_used))]
 
 /// The method of docs/method.md, as tested code.

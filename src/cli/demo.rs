@@ -2,7 +2,9 @@
 //! in accuracy and the features.
 
 use std::fmt;
-use std::path::{Path, PathBuf};
+#[cfg(any(feature = "ros", feature = "r2r"))]
+use std::path::Path;
+use std::path::PathBuf;
 
 use clap::Args;
 use nalgebra::Point3;

@@ -47,7 +47,7 @@ use common::error::{
 };
 use common::output::{
     by_reason, check_kept, check_kept_by, check_outputs, check_place, not_written, notify,
-    notify_with_code, print_report, print_result, write_json,
+    print_report, print_result, write_json,
 };
 
 use std::ffi::OsString;

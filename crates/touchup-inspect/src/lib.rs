@@ -2,8 +2,8 @@
 //! all of them as HTML, CSV, JSON and QIF.
 //!
 //! Measurement ([`InspectionSource`]) and nominal part ([`PartDrawing`]) give the characteristics
-//! ([`inspected`]); [`touchup_features::conformity`] decides. Command line and operator page make the same
-//! report from the same files.
+//! ([`inspected`]); [`touchup_features::conformity`] decides. Command line and operator page make
+//! the same report from the same files.
 
 mod alignment;
 mod calibration;

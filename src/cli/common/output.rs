@@ -2,7 +2,7 @@
 //! begins.
 
 use std::collections::BTreeMap;
-use std::io::{self, ErrorKind, IsTerminal, Write, stdout};
+use std::io::{self, ErrorKind, Write, stdout};
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
@@ -50,10 +50,11 @@ pub(in crate::cli) fn notify(line: &str) {
 }
 
 /// As [`notify`], with the lines of a QR code below, dark on light in a terminal of any colours.
+#[cfg(feature = "web")]
 pub(in crate::cli) fn notify_with_code(line: &str, code: &str) {
     notify(line);
     let mut err = io::stderr().lock();
-    let [begin, end] = match err.is_terminal() {
+    let [begin, end] = match io::IsTerminal::is_terminal(&err) {
         true => ["\x1b[30;107m", "\x1b[0m\n"],
         false => ["", "\n"],
     };

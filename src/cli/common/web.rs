@@ -8,11 +8,11 @@ use clap::Args;
 
 use super::begin::BeginError;
 #[cfg(feature = "web")]
+use super::output::{notify, notify_with_code};
+#[cfg(feature = "web")]
 use super::set_up::{set_up, set_up_on_page};
 use crate::cli::CliError;
 use crate::cli::require;
-#[cfg(feature = "web")]
-use crate::cli::{notify, notify_with_code};
 use touchup_geometry::mesh::TriMesh;
 use touchup_io::mesh_file::MeshUnit;
 use touchup_node::node::PreparedNode;

@@ -284,21 +284,9 @@ mod tests {
     use nalgebra::Point3;
 
     use super::cursor::tests::PatchReader;
+    use super::version::tests::strip;
     use super::*;
     use touchup_method::reconstruct::Support;
-
-    /// A strip of triangles between two rows of `columns` vertices.
-    fn strip(columns: u32) -> TriMesh {
-        let at = |i: u32| Point3::new(f64::from(i / 2), f64::from(i % 2), 0.0);
-        let faces = (0..2 * columns - 2).map(|i| {
-            if i % 2 == 0 {
-                [i, i + 2, i + 1]
-            } else {
-                [i, i + 1, i + 2]
-            }
-        });
-        TriMesh::new((0..2 * columns).map(at).collect(), faces.collect()).unwrap()
-    }
 
     fn feed() -> Arc<MeshFeed> {
         let scan = strip(10);

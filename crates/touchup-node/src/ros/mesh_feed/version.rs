@@ -192,12 +192,12 @@ impl MeshVersion {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::super::edits::VertexPlace;
     use super::*;
 
     /// A strip of triangles between two rows of `columns` vertices.
-    fn strip(columns: u32) -> TriMesh {
+    pub fn strip(columns: u32) -> TriMesh {
         let at = |i: u32| Point3::new(f64::from(i / 2), f64::from(i % 2), 0.0);
         let faces = (0..2 * columns - 2).map(|i| {
             if i % 2 == 0 {
