@@ -8,12 +8,10 @@ use clap::Args;
 use serde::Serialize;
 
 use super::common::progress::WorkProgress;
-use super::common::recorded::RecordedFlags;
+use super::common::recorded::RecordingFlags;
 use super::{CliError, Losses, check_kept, check_outputs, check_place, counted, print_report};
 use touchup_io::features_file::read_features;
-use touchup_io::recording::{
-    CopiedRecording, RecordingReader, StampSource, Topics, copy_recording,
-};
+use touchup_io::recording::{CopiedRecording, RecordingReader, Topics, copy_recording};
 use touchup_io::result_table::{ResultTable, is_table};
 use touchup_session::scene::Scene;
 
@@ -31,10 +29,7 @@ pub(super) struct ConvertArguments {
     #[arg(long, value_name = "YAML")]
     scene: Option<PathBuf>,
     #[command(flatten)]
-    recorded: RecordedFlags,
-    /// Time source of messages: their header, or their recording, for headers without a usable time
-    #[arg(long, value_name = "S", default_value = "header")]
-    stamp: StampSource,
+    recorded: RecordingFlags,
     /// Prints the counts as one JSON object
     #[arg(long)]
     json: bool,
@@ -97,8 +92,7 @@ pub(super) fn convert(arguments: &ConvertArguments) -> Result<Losses, CliError> 
         input,
         out,
         scene,
-        recorded,
-        stamp,
+        recorded: RecordingFlags { location, stamp },
         json,
     } = arguments;
     check_kept("INPUT", input, out)?;
@@ -114,7 +108,7 @@ pub(super) fn convert(arguments: &ConvertArguments) -> Result<Losses, CliError> 
     let scene = scene
         .as_deref()
         .map_or_else(|| Ok(Scene::default()), Scene::read)?;
-    let layout = recorded.layout(&scene);
+    let layout = location.layout(&scene);
     let topics = Topics {
         markers: layout.topics.markers.clone(),
         ..Topics::default()

@@ -7,15 +7,13 @@ use clap::Args;
 use serde::Serialize;
 
 use super::common::progress::WorkProgress;
-use super::common::recorded::RecordedFlags;
+use super::common::recorded::RecordingFlags;
 use super::common::told::{ToldFlags, ToldNumbers};
 use super::{CliError, Losses, print_report};
 use touchup_features::diagnose::InputFinding;
 use touchup_io::mesh_file::MeshUnit;
-use touchup_io::recording::StampSource;
 use touchup_session::input_check::{InputCheck, check_input};
 use touchup_session::refinement::{InputNames, WrenchOffset, refuse_unsound};
-use touchup_session::replay::{Recording, marker_filter};
 use touchup_session::scan::read_scan;
 
 #[derive(Debug, Args)]
@@ -34,10 +32,7 @@ pub(super) struct DoctorArguments {
     #[arg(long, value_name = "YAML")]
     scene: Option<PathBuf>,
     #[command(flatten)]
-    recorded: RecordedFlags,
-    /// Time source of messages: their header, or their recording, for headers without a usable time
-    #[arg(long, value_name = "S", default_value = "header")]
-    stamp: StampSource,
+    recorded: RecordingFlags,
     #[command(flatten)]
     told: ToldFlags,
     /// Prints the findings as one JSON object
@@ -75,12 +70,7 @@ impl fmt::Display for Diagnosis {
 pub(super) fn doctor(arguments: &DoctorArguments) -> Result<Losses, CliError> {
     let (scene, told) = arguments.told.scene(arguments.scene.as_deref())?;
     let scan = read_scan(&arguments.scan, arguments.mesh_unit)?.mesh;
-    let markers = marker_filter(&scene, arguments.recorded.markers_topic.as_deref())?;
-    let recording = Recording::open(
-        &arguments.recording,
-        arguments.recorded.layout(&scene),
-        arguments.stamp,
-    )?;
+    let (recording, markers) = arguments.recorded.open(&arguments.recording, &scene)?;
     let mut progress = WorkProgress::new("replay", recording.message_count());
     let found = check_input(recording, &scan, &scene, markers, &mut || progress.step())?;
     let InputCheck {

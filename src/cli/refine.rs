@@ -7,7 +7,7 @@ use clap::builder::{OsStringValueParser, TypedValueParser};
 
 #[cfg(any(feature = "ros", feature = "r2r"))]
 use super::common::path_parameter::path;
-use super::common::recorded::RecordedFlags;
+use super::common::recorded::RecordingFlags;
 use super::common::refinement::{RefinementFiles, RefinementResult};
 use super::common::told::{ToldFlags, ToldNumbers};
 #[cfg(any(feature = "ros", feature = "r2r"))]
@@ -17,13 +17,11 @@ use super::page::{on_page, parameters_of};
 use super::{CliError, Losses, check_kept_by, check_place, print_report, require};
 use touchup_io::atomic::is_same_file;
 use touchup_io::mesh_file::{MeshFileError, MeshUnit, check_target};
-use touchup_io::recording::StampSource;
 #[cfg(any(feature = "ros", feature = "r2r"))]
 use touchup_node::node::NodeEnd;
 use touchup_session::live::Pace;
 use touchup_session::refinement::RefinementOptions;
-#[cfg(any(feature = "ros", feature = "r2r"))]
-use touchup_session::replay::{Recording, marker_filter};
+use touchup_session::replay::RecordedAs;
 use touchup_session::scene::{Mode, Scene};
 use touchup_session::session::{SessionRecord, StrokeChanges};
 
@@ -46,10 +44,7 @@ pub(super) struct RefineArguments {
     #[arg(long, value_name = "YAML")]
     scene: Option<PathBuf>,
     #[command(flatten)]
-    recorded: RecordedFlags,
-    /// Time source of messages: their header, or their recording, for headers without a usable time
-    #[arg(long, value_name = "S", default_value = "header")]
-    stamp: StampSource,
+    recorded: RecordingFlags,
     #[command(flatten)]
     told: ToldFlags,
     /// The robust method, or the published one literally
@@ -135,7 +130,7 @@ impl RefineArguments {
                 strokes,
             } = SessionRecord::open(&session)?;
             (self.scan, self.mesh_unit, self.scene) = (scan, mesh_unit, Some(scene));
-            (self.bag, self.recorded) = (recording, topics.into());
+            (self.bag, self.recorded.location) = (recording, topics.into());
             self.strokes = strokes;
             if self.out.as_os_str().is_empty() {
                 self.out = session.join("refined.ply");
@@ -164,8 +159,7 @@ impl RefineArguments {
         self.check_page()?;
         let (scene, _) = self.scene()?;
         self.check_out()?;
-        let markers = marker_filter(&scene, self.recorded.markers_topic.as_deref())?;
-        let recording = Recording::open(&self.bag, self.recorded.layout(&scene), self.stamp)?;
+        let (recording, markers) = self.recorded.open(&self.bag, &scene)?;
         let folder = self
             .out
             .parent()
@@ -245,7 +239,10 @@ impl RefineArguments {
             scan: self.scan.clone(),
             mesh_unit: self.mesh_unit,
             recording: self.bag.clone(),
-            recorded: self.recorded.named(self.stamp),
+            recorded: RecordedAs {
+                stamp: Some(self.recorded.stamp.to_string()),
+                ..self.recorded.location.clone()
+            },
             mesh_out: self.out.clone(),
             features_out: self.features_out.clone(),
             touches_out: self.touches_out.clone(),

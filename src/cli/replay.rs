@@ -9,7 +9,6 @@ use clap::Args;
 use serde::Serialize;
 
 use super::common::progress::WorkProgress;
-use super::common::recorded::RecordedFlags;
 use super::{CliError, Losses, counted, notify, print_report};
 use touchup_io::recording::StampSource;
 use touchup_method::stylus::MarkerFilter;
@@ -21,7 +20,7 @@ use touchup_node::ros::parameters::ParameterValue;
 use touchup_node::ros::playback::{PlayedTime, wrench_frame_id};
 use touchup_node::ros::port::SamplePort;
 use touchup_node::ros::{as_pose, as_wrench};
-use touchup_session::replay::{Recording, ReplaySummary, each_message, marker_filter};
+use touchup_session::replay::{RecordedAs, Recording, ReplaySummary, each_message};
 use touchup_session::scene::Scene;
 
 /// Wait after discovery of the subscribers, which do not announce their own discovery of this node.
@@ -46,7 +45,7 @@ pub(super) struct ReplayArguments {
     #[arg(long, value_name = "WHO", default_value = "stylus", value_parser = ["stylus", "probe"])]
     source: String,
     #[command(flatten)]
-    recorded: RecordedFlags,
+    recorded: RecordedAs,
     /// Scene with the positions of the markers
     #[arg(long, value_name = "YAML")]
     scene: Option<PathBuf>,
@@ -85,12 +84,8 @@ pub(super) fn replay(arguments: &ReplayArguments, ros: &[String]) -> Result<Loss
         .scene
         .as_deref()
         .map_or_else(|| Ok(Scene::default()), Scene::read)?;
-    let markers = marker_filter(&scene, arguments.recorded.markers_topic.as_deref())?;
-    let recording = Recording::open(
-        &arguments.recording,
-        arguments.recorded.layout(&scene),
-        StampSource::Header,
-    )?;
+    let recorded = &arguments.recorded;
+    let (recording, markers) = recorded.open(&arguments.recording, &scene, StampSource::Header)?;
     let mut port = ros::samples(&config)?;
     wait_for_listeners(&mut *port, &config, &arguments.recording);
 

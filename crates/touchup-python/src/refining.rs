@@ -11,7 +11,7 @@ use touchup_method::stylus::{Message, WrenchFrame};
 use touchup_session::refinement::{
     InputNames, RefinedScan, Refinement, RefinementInput, RefinementOptions, refine as refine_scan,
 };
-use touchup_session::replay::{RecordedAs, Recording, marker_filter};
+use touchup_session::replay::{RecordedAs, Recording};
 use touchup_session::scan::{read_scan, warn_of_left_out};
 use touchup_session::session::RefinedMesh;
 
@@ -130,9 +130,8 @@ fn refined(
     let (recording, recording_name, markers) = match touching {
         Touching::File(path, recorded) => {
             let stamps = recorded.checked_stamps().map_err(usage)?;
-            let layout = recorded.layout(&input.scene);
-            let markers = marker_filter(&input.scene, recorded.markers_topic.as_deref())?;
-            (Recording::open(&path, layout, stamps)?, path, markers)
+            let (recording, markers) = recorded.open(&path, &input.scene, stamps)?;
+            (recording, path, markers)
         }
         Touching::Messages(all, frame) => (
             Recording::of_messages(all, frame),

@@ -9,7 +9,7 @@ mod tip;
 
 use clap::Subcommand;
 
-use self::recording::RecordingFlags;
+use self::recording::calibrated;
 use self::target::CalibrationTarget;
 use super::{CliError, Losses};
 

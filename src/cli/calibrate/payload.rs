@@ -8,12 +8,13 @@ use clap::{Args, ValueEnum};
 use super::super::probing::KeptMeasurements;
 use super::super::probing::arm::{CellArguments, Measurement, RobotName, TruePayload};
 use super::super::{CliError, Losses, require};
-use super::{CalibrationTarget, RecordingFlags};
+use super::{CalibrationTarget, calibrated};
 use touchup_method::stylus::WrenchFrame;
 use touchup_session::calibration::{
     PayloadCalibrationParams, calibrate_payload, calibrate_payload_by_arm,
     calibrate_payload_by_table,
 };
+use touchup_session::replay::RecordedAs;
 use touchup_session::scene::Scene;
 use touchup_sim::ArmParams;
 
@@ -44,7 +45,7 @@ pub(in crate::cli) struct PayloadArguments {
     #[arg(long, value_name = "G", default_value = "9.81")]
     gravity_m_per_s2: f64,
     #[command(flatten)]
-    source: RecordingFlags,
+    source: RecordedAs,
     #[command(flatten)]
     target: CalibrationTarget,
 }
@@ -71,7 +72,7 @@ pub(super) fn payload(arguments: &PayloadArguments) -> Result<Losses, CliError> 
         (Some(robot), ..) => payload_of_arm(arguments, robot, params.gravity),
         (_, Some(bag), _) => {
             let draft = target.open("--bag", bag)?;
-            let calibration = source.calibrate(bag, &draft.scene, |recording, at_each| {
+            let calibration = calibrated(bag, source, &draft.scene, |recording, at_each| {
                 calibrate_payload(recording, &draft.scene, params, at_each)
             })?;
             target.write(&draft, calibration)

@@ -5,8 +5,9 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::super::{CliError, Losses, check_kept, require};
-use super::{CalibrationTarget, RecordingFlags};
+use super::{CalibrationTarget, calibrated};
 use touchup_session::calibration::calibrate_scan;
+use touchup_session::replay::RecordedAs;
 
 #[derive(Debug, Args)]
 pub(in crate::cli) struct ScanArguments {
@@ -21,7 +22,7 @@ pub(in crate::cli) struct ScanArguments {
     #[arg(long, value_name = "S")]
     sigma_mm: Option<f64>,
     #[command(flatten)]
-    source: RecordingFlags,
+    source: RecordedAs,
     #[command(flatten)]
     target: CalibrationTarget,
 }
@@ -47,7 +48,7 @@ pub(super) fn scan(arguments: &ScanArguments) -> Result<Losses, CliError> {
         Some(bag) => {
             check_kept("--bag", bag, &target.out)?;
             draft.require_radius()?;
-            source.calibrate(bag, &draft.scene, |recording, at_each| {
+            calibrated(bag, source, &draft.scene, |recording, at_each| {
                 calibrate_scan(pairs, Some(recording), &draft.scene, sigma, at_each)
             })?
         }

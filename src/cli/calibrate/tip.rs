@@ -9,8 +9,9 @@ use nalgebra::Point3;
 use super::super::probing::arm::{CellArguments, Measurement, RobotName, TouchesOutput};
 use super::super::probing::{KeptMeasurements, millimetres};
 use super::super::{CliError, Losses};
-use super::{CalibrationTarget, RecordingFlags};
+use super::{CalibrationTarget, calibrated};
 use touchup_session::calibration::{calibrate_tip, calibrate_tip_by_arm};
+use touchup_session::replay::RecordedAs;
 use touchup_session::scene::Scene;
 use touchup_sim::ArmParams;
 
@@ -35,7 +36,7 @@ pub(in crate::cli) struct TipArguments {
     #[command(flatten)]
     output: TouchesOutput,
     #[command(flatten)]
-    source: RecordingFlags,
+    source: RecordedAs,
     #[command(flatten)]
     target: CalibrationTarget,
 }
@@ -55,7 +56,7 @@ pub(super) fn tip(arguments: &TipArguments) -> Result<Losses, CliError> {
     }
     let bag = bag.as_ref().expect("one of --bag and --robot is there");
     let draft = target.open("--bag", bag)?;
-    let calibration = source.calibrate(bag, &draft.scene, |recording, at_each| {
+    let calibration = calibrated(bag, source, &draft.scene, |recording, at_each| {
         calibrate_tip(recording, &draft.scene, at_each)
     })?;
     target.write(&draft, calibration)

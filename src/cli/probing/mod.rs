@@ -16,7 +16,6 @@ use std::path::Path;
 use nalgebra::{Point3, Vector3};
 
 use super::common::progress::WorkProgress;
-use super::common::recorded::RecordedFlags;
 use super::common::refinement::{RefineSummary, RefinementFiles, RefinementResult};
 use super::common::signals::StopSignals;
 use super::common::told::ToldFlags;
@@ -32,11 +31,11 @@ use touchup_features::features::FeatureKind;
 use touchup_io::atomic::create_folder;
 use touchup_io::mesh_file::{MeshFile, MeshUnit, read_mesh};
 use touchup_io::probed_touches_file::TouchLine;
-use touchup_io::recording::StampSource;
 use touchup_probing::arm::{Arm, ArmState};
 use touchup_probing::execute::{Ending, Flag, FlagResult, Plan};
 use touchup_session::probing_run::ProbingRun;
 use touchup_session::refinement::RefinementOptions;
+use touchup_session::replay::RecordedAs;
 use world::LiveWorld;
 pub(super) use world::{KeptMeasurements, SpotWorld};
 
@@ -260,7 +259,7 @@ impl Probing<'_> {
     /// Makes the mesh of the recording in the folder.
     fn refined(&self, touches: &[TouchLine]) -> Result<RefinementResult, CliError> {
         let (scene, told) = ToldFlags::default().scene(Some(self.scene))?;
-        let recorded = RecordedFlags::from(probe_topics()).named(StampSource::default());
+        let recorded = RecordedAs::from(probe_topics());
         let files = RefinementFiles::in_folder(self.scan, self.unit, self.out, RECORDING, recorded);
         let options = RefinementOptions {
             // an arm without any contact has no measurement that could be wrong: each feature says

@@ -15,9 +15,7 @@ use nalgebra::Point3;
 use crate::live::{
     Engine, EngineResult, EvidenceReplay, Gate, Latencies, LiveError, Pace, Renewal,
 };
-use crate::replay::{
-    RecordedAs, Recording, ReplayError, ReplaySummary, each_sample, marker_filter,
-};
+use crate::replay::{RecordedAs, Recording, ReplayError, ReplaySummary, each_sample};
 use crate::scan::{Scan, ScanError, read_scan};
 use crate::scene::{CutScan, RegionCut, Scene, SceneError};
 use crate::session::{OutcomeError, RefinedMesh, StrokeChanges, StrokeReplay};
@@ -202,13 +200,12 @@ impl OpenedInput {
             cloud,
         } = read_scan(scan, mesh_unit)?;
         let input = RefinementInput::new(scene, mesh)?;
-        let markers = marker_filter(&input.scene, recorded.markers_topic.as_deref())?;
-        let layout = recorded.layout(&input.scene);
+        let (recording, markers) = recorded.open(recording, &input.scene, stamps)?;
         Ok(Self {
             input,
             repair,
             cloud,
-            recording: Recording::open(recording, layout, stamps).map_err(ReplayError::from)?,
+            recording,
             markers,
         })
     }

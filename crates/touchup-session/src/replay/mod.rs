@@ -163,7 +163,7 @@ const NO_MARKERS: &str =
 ///
 /// # Errors
 /// [`ReplayError::Markers`] if the scene gives no positions of the markers.
-pub fn marker_filter(
+pub(crate) fn marker_filter(
     scene: &Scene,
     topic: Option<&str>,
 ) -> Result<Option<MarkerFilter>, ReplayError> {

@@ -1,32 +1,67 @@
 //! Location of poses and wrenches in a recording, by the same names for every verb, plan and call.
 
-use serde::{Deserialize, Serialize};
+use std::path::Path;
 
+use clap::Args;
+use serde::{Deserialize, Serialize, Serializer};
+
+use super::{Recording, ReplayError, marker_filter};
 use crate::scene::Scene;
 use touchup_io::recording::{RecordingLayout, StampSource, Topics, TransformFrames};
+use touchup_method::stylus::MarkerFilter;
 
 /// Location of poses and wrenches; unnamed ones have their usual place.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize, Args)]
 #[serde(deny_unknown_fields, default)]
 pub struct RecordedAs {
-    /// `--pose-topic`
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub pose_topic: Option<String>,
-    /// `--wrench-topic`
-    #[serde(skip_serializing_if = "Option::is_none")]
+    /// geometry_msgs/WrenchStamped or another wrench: of the part on the stylus [default:
+    /// /stylus/wrench]
+    #[arg(long, value_name = "TOPIC")]
     pub wrench_topic: Option<String>,
-    /// `--markers-topic`
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub markers_topic: Option<String>,
-    /// `--pose-frame`
-    #[serde(skip_serializing_if = "Option::is_none")]
+    /// geometry_msgs/PoseStamped or another pose: ball centre in the frame of the scan, unless
+    /// tip.offset_mm and scan_to_space of the scene apply [default: /stylus/pose, with --pose-frame
+    /// /tf]
+    #[arg(long, value_name = "TOPIC")]
+    pub pose_topic: Option<String>,
+    /// Frame with the pose, such as tool0, in the transforms on --pose-topic and its _static
+    #[arg(long, value_name = "FRAME")]
     pub pose_frame: Option<String>,
-    /// `--base-frame`
-    #[serde(skip_serializing_if = "Option::is_none")]
+    /// With --pose-frame: reference frame of the pose [default: the root of the tree]
+    #[arg(long, value_name = "FRAME", requires = "pose_frame")]
     pub base_frame: Option<String>,
-    /// `--stamp`
-    #[serde(skip_serializing_if = "Option::is_none")]
+    /// sensor_msgs/PointCloud2: markers on the stylus, in place of the pose; the scene has their
+    /// positions
+    #[arg(long, value_name = "TOPIC", conflicts_with_all = ["pose_topic", "pose_frame"])]
+    pub markers_topic: Option<String>,
+    /// Name of a [`StampSource`]; a flag of its own
+    #[arg(skip)]
     pub stamp: Option<String>,
+}
+
+/// Named places alone; the id of a job depends on their order.
+impl Serialize for RecordedAs {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let places = [
+            ("pose_topic", &self.pose_topic),
+            ("wrench_topic", &self.wrench_topic),
+            ("markers_topic", &self.markers_topic),
+            ("pose_frame", &self.pose_frame),
+            ("base_frame", &self.base_frame),
+            ("stamp", &self.stamp),
+        ];
+        serializer.collect_map(places.into_iter().filter(|(_, place)| place.is_some()))
+    }
+}
+
+impl From<Topics> for RecordedAs {
+    fn from(topics: Topics) -> Self {
+        Self {
+            wrench_topic: Some(topics.wrench),
+            pose_topic: Some(topics.pose),
+            markers_topic: topics.markers,
+            ..Self::default()
+        }
+    }
 }
 
 /// Topic of the transforms, unless another is named.
@@ -61,6 +96,20 @@ impl RecordedAs {
         }
     }
 
+    /// Opens a recording, and the filter that computes the poses of its markers.
+    ///
+    /// # Errors
+    /// [`ReplayError::Markers`], [`ReplayError::Read`].
+    pub fn open(
+        &self,
+        path: &Path,
+        scene: &Scene,
+        stamps: StampSource,
+    ) -> Result<(Recording, Option<MarkerFilter>), ReplayError> {
+        let markers = marker_filter(scene, self.markers_topic.as_deref())?;
+        Ok((Recording::open(path, self.layout(scene), stamps)?, markers))
+    }
+
     /// Which time of a message counts.
     ///
     /// # Errors
@@ -90,6 +139,16 @@ impl RecordedAs {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Jobs of earlier plans have this text in their ids.
+    #[test]
+    fn places_are_written_in_the_order_of_earlier_plans() {
+        let text = r#"{"pose_topic":"/p","wrench_topic":"/w","markers_topic":"/m","pose_frame":"t","base_frame":"b","stamp":"log"}"#;
+        for text in [text, r#"{"wrench_topic":"/w","pose_frame":"t"}"#, "{}"] {
+            let recorded: RecordedAs = serde_json::from_str(text).unwrap();
+            assert_eq!(serde_json::to_string(&recorded).unwrap(), text);
+        }
+    }
 
     #[test]
     fn names_that_do_not_go_together_are_refused() {
