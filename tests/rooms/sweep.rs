@@ -337,7 +337,7 @@ fn a_job_of_given_bytes_is_that_of_its_files() {
     let id = sweep.ids().remove(0);
     let job = JobsFile::job(&sweep.path("jobs.jsonl"), 0).unwrap();
     let run = |results: &str, given: GivenInput<'_>| {
-        let runner = JobRunner::new(sweep.folder.path().to_owned(), sweep.path(results));
+        let runner = JobRunner::new(&sweep.path("jobs.jsonl"), Some(sweep.path(results)));
         runner.run(&job, given, false, &mut || {})
     };
     run("by_files", GivenInput::default()).unwrap();

@@ -51,15 +51,9 @@ pub fn run_job<'py>(
         failed,
         summary,
     } = at_work(py, || {
-        let folder = JobsFile::folder(&jobs);
-        let results = results.unwrap_or_else(|| folder.join("results"));
         let line = JobsFile::job(&jobs, job)?;
-        Ok(JobRunner::new(folder, results).run(
-            &line,
-            GivenInput { scan, recording },
-            again,
-            &mut || {},
-        )?)
+        let given = GivenInput { scan, recording };
+        Ok(JobRunner::new(&jobs, results).run(&line, given, again, &mut || {})?)
     })?;
     let into = PyDict::new(py);
     into.set_item("job", job)?;
@@ -82,7 +76,7 @@ pub fn sweep_tables(
     with_features: bool,
 ) -> PyResult<String> {
     at_work(py, || {
-        let results = results.unwrap_or_else(|| JobsFile::folder(&jobs).join("results"));
+        let results = JobsFile::results(&jobs, results);
         let SweepTables {
             jobs,
             features,

@@ -7,7 +7,7 @@ mod table;
 
 use clap::Subcommand;
 
-pub(super) use self::places::{check_table, results_of};
+pub(super) use self::places::check_table;
 pub use self::plan::plan_sweep;
 use super::{CliError, Losses};
 

@@ -2,14 +2,19 @@
 
 use std::path::{Path, PathBuf};
 
-use super::super::{CliError, check_kept_by, check_place, require};
-use touchup_session::sweep::JobsFile;
+use clap::Args;
 
-/// Folder of the results: as named, or `results` beside the jobs.
-pub(in crate::cli) fn results_of(jobs: &Path, named: Option<&PathBuf>) -> PathBuf {
-    named
-        .cloned()
-        .unwrap_or_else(|| JobsFile::folder(jobs).join("results"))
+use super::super::{CliError, check_kept_by, check_place, require};
+
+/// Jobs of a sweep, and their results.
+#[derive(Debug, Args)]
+pub(super) struct SweepPlaces {
+    /// Jobs, as `touchup sweep plan` writes them
+    #[arg(value_name = "JSONL")]
+    pub jobs: PathBuf,
+    /// Folder with a subfolder for each job, by its id [default: results, beside the jobs]
+    #[arg(long, value_name = "DIR")]
+    pub results: Option<PathBuf>,
 }
 
 /// Checks name and path of a table.

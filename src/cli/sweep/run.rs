@@ -1,6 +1,6 @@
 //! `touchup sweep run`: one job, or all without a result.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use clap::Args;
 use serde::Serialize;
@@ -9,20 +9,16 @@ use serde_json::{Value, json};
 use super::super::common::error::UNSOUND;
 use super::super::common::progress::WorkProgress;
 use super::super::{CliError, Losses, counted, print_report, print_result};
-use super::places::results_of;
+use super::places::SweepPlaces;
 use touchup_session::sweep::{GivenInput, JobReport, JobRunner, JobsFile, SweepError};
 
 #[derive(Debug, Args)]
 pub(in crate::cli) struct RunArguments {
-    /// Jobs, as `touchup sweep plan` writes them
-    #[arg(value_name = "JSONL")]
-    jobs: PathBuf,
     /// Runs the job of this number alone; a job with a result ends at once
     #[arg(long, value_name = "K")]
     job: Option<u64>,
-    /// Folder with a subfolder for each job, by its id [default: results, beside the jobs]
-    #[arg(long, value_name = "DIR")]
-    results: Option<PathBuf>,
+    #[command(flatten)]
+    places: SweepPlaces,
     /// Also reruns jobs with a result, as failed ones, and replaces it
     #[arg(long)]
     again: bool,
@@ -36,13 +32,12 @@ pub(super) const MOST_NAMED: usize = 20;
 
 pub(in crate::cli) fn run(arguments: &RunArguments) -> Result<Losses, CliError> {
     let RunArguments {
-        jobs,
         job,
-        results,
+        places: SweepPlaces { jobs, results },
         again,
         json,
     } = arguments;
-    let runner = JobRunner::new(JobsFile::folder(jobs), results_of(jobs, results.as_ref()));
+    let runner = JobRunner::new(jobs, results.clone());
     match job {
         Some(job) => run_one(&runner, jobs, *job, *again, *json),
         None => run_all(&runner, jobs, *again, *json),

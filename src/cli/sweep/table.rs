@@ -6,18 +6,14 @@ use clap::Args;
 use serde_json::json;
 
 use super::super::{CliError, Losses, counted, print_report, require};
-use super::places::{check_table, results_of};
+use super::places::{SweepPlaces, check_table};
 use super::run::MOST_NAMED;
-use touchup_session::sweep::{SweepTables, tables_of};
+use touchup_session::sweep::{JobsFile, SweepTables, tables_of};
 
 #[derive(Debug, Args)]
 pub(in crate::cli) struct TableArguments {
-    /// Jobs, as `touchup sweep plan` writes them
-    #[arg(value_name = "JSONL")]
-    jobs: PathBuf,
-    /// Folder with a subfolder for each job, by its id [default: results, beside the jobs]
-    #[arg(long, value_name = "DIR")]
-    results: Option<PathBuf>,
+    #[command(flatten)]
+    places: SweepPlaces,
     /// Output: a row for each job with a result, .csv or .parquet
     #[arg(long, value_name = "TABLE")]
     out: PathBuf,
@@ -31,8 +27,7 @@ pub(in crate::cli) struct TableArguments {
 
 pub(in crate::cli) fn table(arguments: &TableArguments) -> Result<Losses, CliError> {
     let TableArguments {
-        jobs,
-        results,
+        places: SweepPlaces { jobs, results },
         out,
         features_out,
         json,
@@ -45,7 +40,7 @@ pub(in crate::cli) fn table(arguments: &TableArguments) -> Result<Losses, CliErr
         features_out.as_ref() != Some(out),
         "--out and --features-out are the same file: choose another place",
     )?;
-    let results = results_of(jobs, results.as_ref());
+    let results = JobsFile::results(jobs, results.clone());
     let SweepTables {
         jobs,
         features,

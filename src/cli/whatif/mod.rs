@@ -13,7 +13,7 @@ use self::report::WhatIfReport;
 pub use self::report::what_if_json;
 use self::tables::{features_table, vertices_table, write_moved_mesh};
 use super::common::progress::WorkProgress;
-use super::sweep::{check_table, results_of};
+use super::sweep::check_table;
 use super::{CliError, Losses, check_kept_by, check_outputs, not_written, print_report, require};
 use touchup_session::sweep::{JobResult, JobsFile, WhatIf};
 
@@ -125,7 +125,7 @@ impl WhatIfArguments {
         let Some(jobs) = &self.jobs else {
             return self.given_folders();
         };
-        let results = results_of(jobs, self.results.as_ref());
+        let results = JobsFile::results(jobs, self.results.clone());
         let folder = |name: &String| {
             let number = name.parse::<u64>();
             let why = format!(

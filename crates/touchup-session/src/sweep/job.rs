@@ -68,6 +68,11 @@ impl JobsFile {
         path.parent().unwrap_or(Path::new("")).to_owned()
     }
 
+    /// The folder of the results: as named, or `results` beside the file.
+    pub fn results(path: &Path, named: Option<PathBuf>) -> PathBuf {
+        named.unwrap_or_else(|| Self::folder(path).join("results"))
+    }
+
     /// One job.
     ///
     /// # Errors

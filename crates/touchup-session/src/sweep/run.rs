@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use super::base_scene::{BaseScene, JobScene};
 use super::error::SweepError;
-use super::job::Job;
+use super::job::{Job, JobsFile};
 use super::record::{JobRecord, RECORD, read_record};
 use super::summary::JobSummary;
 use crate::refinement::{
@@ -71,12 +71,12 @@ struct InputFile {
 }
 
 impl JobRunner {
-    /// - `folder`: folder of the file of jobs.
+    /// - `jobs`: the file of jobs.
     /// - `results`: parent of the result folders, each named by its id; created if missing.
-    pub fn new(folder: PathBuf, results: PathBuf) -> Self {
+    pub fn new(jobs: &Path, results: Option<PathBuf>) -> Self {
         Self {
-            folder,
-            results,
+            folder: JobsFile::folder(jobs),
+            results: JobsFile::results(jobs, results),
             hashes: RefCell::default(),
         }
     }
