@@ -7,9 +7,7 @@ use clap::Args;
 use serde::Serialize;
 
 use crate::cli::CliError;
-use touchup_session::scene::Scene;
-#[cfg(any(feature = "ros", feature = "r2r"))]
-use touchup_session::scene::Setting;
+use touchup_session::scene::{Scene, Setting};
 
 /// Flags for tip and scan, over the scene.
 #[derive(Clone, Debug, Default, Args)]
@@ -56,11 +54,25 @@ impl ToldFlags {
         );
         Ok((scene, told))
     }
-}
 
-impl ToldFlags {
+    /// Settings of a scene, one for each flag.
+    pub fn settings(&self) -> impl Iterator<Item = Setting> {
+        let told = [
+            ("tip.radius_mm", self.tip_radius_mm),
+            ("tip.stiffness_n_per_mm", self.stiffness_n_per_mm),
+            ("scan.noise_mm", self.scan_noise_mm),
+        ];
+        told.into_iter()
+            .filter_map(|(key, number)| Some(Setting::scalar(key, number?)))
+    }
+
     /// Applies the flags.
-    fn tell(&self, scene: &mut Scene, yaml: &str) -> Result<(), CliError> {
+    ///
+    /// - `yaml`: text of the scene.
+    ///
+    /// # Errors
+    /// A missing tip radius, and a flag out of its range.
+    pub fn tell(&self, scene: &mut Scene, yaml: &str) -> Result<(), CliError> {
         scene.tell_radius(yaml, self.tip_radius_mm)?;
         if let Some(stiffness) = self.stiffness_n_per_mm {
             scene.tip.get_or_insert_default().ball.stiffness = Some(stiffness * 1e3);
@@ -84,15 +96,7 @@ impl ToldFlags {
         };
         let mut expected = Scene::from_yaml(&yaml)?;
         self.tell(&mut expected, &yaml)?;
-        let told = [
-            ("tip.radius_mm", self.tip_radius_mm),
-            ("tip.stiffness_n_per_mm", self.stiffness_n_per_mm),
-            ("scan.noise_mm", self.scan_noise_mm),
-        ];
-        let settings: Vec<_> = told
-            .into_iter()
-            .filter_map(|(key, number)| Some(Setting::scalar(key, number?)))
-            .collect();
+        let settings: Vec<_> = self.settings().collect();
         Ok(Scene::edited(
             &yaml,
             &settings,
