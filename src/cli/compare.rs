@@ -14,7 +14,7 @@ use self::alignment::{
 };
 use self::table::CompareReport;
 pub use self::table::comparison_json;
-use super::common::pictures::{file_name, today, view_from, write_coloured, write_picture};
+use super::common::pictures::{ViewFlag, file_name, today, write_coloured, write_picture};
 use super::common::progress::WorkProgress;
 use super::{CliError, Losses, check_outputs, print_report, require};
 use touchup_features::compare::{
@@ -34,6 +34,7 @@ const TOLERANCE_MM: f64 = 0.1;
 const SAMPLES: u32 = 200_000;
 
 #[derive(Debug, Default, Args)]
+#[command(mut_arg("view", |flag| flag.help("View direction of the picture, in the frame of TRUTH; default: the touched side")))]
 pub(super) struct CompareArguments {
     /// Mesh (PLY, STL, OBJ) or point cloud (PLY, PCD, XYZ, E57) to compare; touched and untouched
     /// parts of a refined PLY get rows of their own
@@ -79,15 +80,8 @@ pub(super) struct CompareArguments {
     /// Further features to name in the picture.
     #[arg(skip)]
     named: Vec<FeatureRecord>,
-    /// View direction of the picture, in the frame of TRUTH; default: the touched side
-    #[arg(
-        long,
-        value_name = "X,Y,Z",
-        value_delimiter = ',',
-        num_args = 3,
-        allow_negative_numbers = true
-    )]
-    view: Option<Vec<f64>>,
+    #[command(flatten)]
+    view: ViewFlag,
     /// Number of points spread over TRUTH; MESH gets the same density
     #[arg(long, value_name = "N", default_value_t = SAMPLES, value_parser = clap::value_parser!(u32).range(100..=5_000_000))]
     samples: u32,
@@ -363,7 +357,7 @@ impl CompareArguments {
             caption,
             range: refined.range,
             tolerance: self.tolerance_mm.map(|tolerance| tolerance * 1e-3),
-            from: view_from(self.view.as_ref())?,
+            from: self.view.direction()?,
             weights: weights.as_deref(),
             labels,
             ..PictureParams::default()
@@ -436,7 +430,7 @@ impl CompareArguments {
             [&self.before, &self.pairs, &self.features].map(Option::as_ref);
         let inputs = [Some(&self.mesh), Some(&self.truth), before, pairs, features];
         check_outputs(&outputs, &inputs, "compared: choose another place")?;
-        view_from(self.view.as_ref()).map(drop)
+        self.view.direction().map(drop)
     }
 }
 

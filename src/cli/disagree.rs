@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use nalgebra::Vector3;
 
-use super::common::pictures::{file_name, today, view_from, write_coloured, write_picture};
+use super::common::pictures::{ViewFlag, file_name, today, write_coloured, write_picture};
 use super::common::progress::WorkProgress;
 use super::{CliError, Losses, check_outputs, counted, print_report, reported};
 use touchup_features::compare::{
@@ -41,15 +41,8 @@ pub(super) struct DisagreeArguments {
     /// Writes a picture of REFINED, coloured by class, and by its disagreement with SCAN
     #[arg(long, value_name = "PNG")]
     picture: Option<PathBuf>,
-    /// View direction of the picture; default: the touched side
-    #[arg(
-        long,
-        value_name = "X,Y,Z",
-        value_delimiter = ',',
-        num_args = 3,
-        allow_negative_numbers = true
-    )]
-    view: Option<Vec<f64>>,
+    #[command(flatten)]
+    view: ViewFlag,
     /// Prints one JSON object
     #[arg(long)]
     json: bool,
@@ -218,7 +211,7 @@ impl DisagreeArguments {
             &[&self.scan, &self.refined, &self.touches].map(Some),
             "read",
         )?;
-        view_from(self.view.as_ref()).map(drop)
+        self.view.direction().map(drop)
     }
 
     fn draw(&self, refined: &TriMesh, found: &Disagreement) -> Result<(), CliError> {
@@ -251,7 +244,7 @@ impl DisagreeArguments {
             title: &format!("where {refined_name} and the scan {scan_name} disagree"),
             caption: &today(),
             range,
-            from: view_from(self.view.as_ref())?,
+            from: self.view.direction()?,
             weights: Some(&weights),
             ..PictureParams::default()
         };

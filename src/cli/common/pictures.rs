@@ -4,6 +4,7 @@ use std::path::Path;
 use std::time::SystemTime;
 
 use chrono::{DateTime, Utc};
+use clap::Args;
 use nalgebra::Vector3;
 
 use super::error::{CliError, require};
@@ -26,15 +27,31 @@ pub(in crate::cli) fn file_name(path: &Path) -> String {
         .map_or(String::new(), |name| name.to_string_lossy().into_owned())
 }
 
-/// Direction of `--view`.
-pub(in crate::cli) fn view_from(view: Option<&Vec<f64>>) -> Result<Option<Vector3<f64>>, CliError> {
-    let is_direction =
-        |view: &Vec<f64>| view.iter().all(|x| x.is_finite()) && view.iter().any(|x| *x != 0.0);
-    require(
-        view.is_none_or(is_direction),
-        "--view must be a direction, such as 1,-1,0.5",
-    )?;
-    Ok(view.map(|view| Vector3::from_column_slice(view)))
+/// Direction of view.
+#[derive(Debug, Default, Args)]
+pub(in crate::cli) struct ViewFlag {
+    /// View direction of the picture; default: the touched side
+    #[arg(
+        long,
+        value_name = "X,Y,Z",
+        value_delimiter = ',',
+        num_args = 3,
+        allow_negative_numbers = true
+    )]
+    view: Option<Vec<f64>>,
+}
+
+impl ViewFlag {
+    /// Direction; `None`: the touched side.
+    pub fn direction(&self) -> Result<Option<Vector3<f64>>, CliError> {
+        let is_direction =
+            |view: &Vec<f64>| view.iter().all(|x| x.is_finite()) && view.iter().any(|x| *x != 0.0);
+        require(
+            self.view.as_ref().is_none_or(is_direction),
+            "--view must be a direction, such as 1,-1,0.5",
+        )?;
+        Ok(self.view.as_deref().map(Vector3::from_column_slice))
+    }
 }
 
 /// Draws panels beside each other into a file.

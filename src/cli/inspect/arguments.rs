@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use crate::cli::common::pictures::view_from;
+use crate::cli::common::pictures::ViewFlag;
 use crate::cli::common::progress::WorkProgress;
 use crate::cli::{CliError, check_outputs};
 use touchup_features::conformity::{DecisionParams, DecisionRule, GeneralTolerance};
@@ -77,15 +77,8 @@ pub(in crate::cli) struct InspectArguments {
     /// Name of the inspector
     #[arg(long, value_name = "NAME")]
     pub operator: Option<String>,
-    /// View direction of the picture; default: the touched side
-    #[arg(
-        long,
-        value_name = "X,Y,Z",
-        value_delimiter = ',',
-        num_args = 3,
-        allow_negative_numbers = true
-    )]
-    pub view: Option<Vec<f64>>,
+    #[command(flatten)]
+    pub view: ViewFlag,
     /// Output: the report, one printable HTML file
     #[arg(long, value_name = "HTML")]
     pub out: Option<PathBuf>,
@@ -129,7 +122,7 @@ impl InspectArguments {
             "read: choose another place",
         )?;
         self.params().check()?;
-        view_from(self.view.as_ref()).map(drop)
+        self.view.direction().map(drop)
     }
 
     /// Parameters of the inspection.

@@ -7,7 +7,6 @@ mod summary;
 mod template;
 
 pub(super) use self::arguments::InspectArguments;
-use super::common::pictures::view_from;
 use super::common::progress::WorkProgress;
 use super::{CliError, Losses, print_report};
 use touchup_inspect::{Inspection, InspectionSource, PartDrawing, PartPicture, inspected};
@@ -49,7 +48,7 @@ fn write(
     let _writing = WorkProgress::stage("write the report");
     let picture = PartPicture {
         mesh_unit: arguments.mesh_unit,
-        view: view_from(arguments.view.as_ref())?,
+        view: arguments.view.direction()?,
     };
     Ok(arguments.files().write(source, inspected, &picture)?)
 }
