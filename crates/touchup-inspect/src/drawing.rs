@@ -3,9 +3,11 @@
 
 use std::path::Path;
 
+use clap::Args;
 use nalgebra::{Point3, Vector3};
 
 use super::InspectionError;
+use super::alignment::AlignmentMethod;
 use super::drawn_feature::{DrawnFeature, measured, shape_of};
 use super::source::inspected_file;
 use super::words::first_few;
@@ -18,17 +20,30 @@ use touchup_io::nominal_file::{NominalRecord, NominalTolerance, is_nominal_file,
 use touchup_session::scan::read_scan;
 use touchup_session::session::found;
 
-/// Additions to nominal values.
-#[derive(Clone, Debug, Default)]
+/// Settings of a drawing: additions to its nominal values, and its place on the part.
+#[derive(Clone, Debug, Args)]
 pub struct DrawingParams {
-    /// unit of a CAD mesh
+    /// Unit of the coordinates in the CAD mesh of --nominal
+    #[arg(long = "nominal-unit", value_name = "U", default_value = "mm")]
     pub unit: MeshUnit,
-    /// tolerance of sizes without one of their own
+    /// General tolerance for sizes without their own
+    #[arg(long, value_name = "CLASS", conflicts_with = "tolerance_mm")]
     pub general: Option<GeneralTolerance>,
-    /// symmetric tolerance ± mm instead
+    /// Tolerance ± for all sizes without their own, mm; instead of --general
+    #[arg(long, value_name = "T")]
     pub tolerance_mm: Option<f64>,
-    /// diameter of the position zone for features of a CAD mesh, mm
+    /// With a CAD mesh: also the position of each hole, slot, pocket and boss, within a zone of
+    /// this diameter, mm
+    #[arg(long, value_name = "D")]
     pub position_mm: Option<f64>,
+    /// Largest distance across the axis between the centres of a feature and its nominal one, mm
+    // less than the distance between neighbours on most parts
+    #[arg(long, value_name = "R", default_value_t = 1.5)]
+    pub match_mm: f64,
+    /// Aligns drawing and part: best-fit, over all common features; or datums=NAME,NAME,NAME, names
+    /// of characteristics, primary to tertiary. Positions are then in the drawing's frame
+    #[arg(long, value_name = "HOW")]
+    pub align: Option<AlignmentMethod>,
 }
 
 /// One characteristic and its limits.

@@ -23,7 +23,7 @@ pub use self::alignment::AlignmentMethod;
 pub use self::drawing::{DrawingParams, PartDrawing, template};
 pub use self::error::InspectionError;
 pub use self::files::ReportFiles;
-pub use self::params::{InspectionParams, PartPicture, decision_rule, general_tolerance};
+pub use self::params::{InspectionParams, PartPicture, ReportParams};
 pub use self::rows::{Inspection, inspected};
 pub use self::source::InspectionSource;
 pub use self::words::{first_few, percent};

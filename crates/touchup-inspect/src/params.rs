@@ -1,32 +1,45 @@
-//! Settings of an inspection, and the report's administrative data.
+//! Settings of an inspection, by the flags of the command line and by their names elsewhere.
 
+use clap::{Args, Command, FromArgMatches};
 use nalgebra::Vector3;
 
 use super::InspectionError;
-use super::alignment::AlignmentMethod;
 use super::drawing::DrawingParams;
-use touchup_features::conformity::{DecisionParams, DecisionRule, GeneralTolerance};
+use touchup_features::conformity::{DecisionParams, DecisionRule};
 use touchup_io::mesh_file::MeshUnit;
 
 /// Settings of an inspection.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Args)]
 pub struct InspectionParams {
-    /// additions to the nominal values
+    /// the drawing
+    #[command(flatten)]
     pub drawing: DrawingParams,
-    /// decision rule
-    pub decision: DecisionParams,
-    /// k of the expanded uncertainties U = k u. Default 2: about 95 %, as on certificates.
+    /// decisions and head of the report
+    #[command(flatten)]
+    pub report: ReportParams,
+}
+
+/// Settings of a report: its decisions, and the administrative data in its head.
+#[derive(Clone, Debug, Args)]
+pub struct ReportParams {
+    /// Decision rule: guard bands, or the measured value alone
+    #[arg(long, value_name = "RULE", default_value_t = DecisionParams::default().rule)]
+    pub rule: DecisionRule,
+    /// Minimum probability of conformity for a pass, and of nonconformity for a fail
+    #[arg(long, value_name = "P", default_value_t = DecisionParams::default().confidence)]
+    pub confidence: f64,
+    /// Coverage factor of the expanded uncertainties U = k u
+    // about 95 %, as on certificates
+    #[arg(long = "k", value_name = "K", default_value_t = 2.0)]
     pub coverage_factor: f64,
-    /// Largest distance of a feature's centre from its nominal place, across the axis, mm. Default
-    /// 1.5: less than the distance between neighbours on most parts.
-    pub match_mm: f64,
-    /// alignment with the drawing; `None`: the drawing frame is the mesh frame
-    pub align: Option<AlignmentMethod>,
-    /// name or number of the part
+    /// Name or number of the part
+    #[arg(long, value_name = "NAME")]
     pub part: Option<String>,
-    /// serial number of this part
+    /// Serial number of the part
+    #[arg(long, value_name = "S")]
     pub serial: Option<String>,
-    /// name of the inspector
+    /// Name of the inspector
+    #[arg(long, value_name = "NAME")]
     pub operator: Option<String>,
 }
 
@@ -39,37 +52,50 @@ pub struct PartPicture {
     pub view: Option<Vector3<f64>>,
 }
 
-impl Default for InspectionParams {
-    fn default() -> Self {
-        Self {
-            drawing: DrawingParams::default(),
-            decision: DecisionParams::default(),
-            coverage_factor: 2.0,
-            match_mm: 1.5,
-            align: None,
-            part: None,
-            serial: None,
-            operator: None,
+impl ReportParams {
+    /// Settings of the decisions.
+    pub fn decision(&self) -> DecisionParams {
+        DecisionParams {
+            rule: self.rule,
+            confidence: self.confidence,
         }
     }
 }
 
 impl InspectionParams {
+    /// Settings by the names of their flags, `match_mm` for `--match-mm`; unnamed ones have their
+    /// defaults.
+    ///
+    /// # Errors
+    /// The words of the command line.
+    pub fn named<'a>(
+        settings: impl IntoIterator<Item = (&'a str, &'a str)>,
+    ) -> Result<Self, String> {
+        let flags = settings
+            .into_iter()
+            .map(|(name, value)| format!("--{}={value}", name.replace('_', "-")));
+        let command = Command::new("inspect")
+            .no_binary_name(true)
+            .disable_help_flag(true);
+        let found = Self::augment_args(command)
+            .try_get_matches_from(flags)
+            .and_then(|matches| Self::from_arg_matches(&matches));
+        found.map_err(|error| {
+            let text = error.to_string();
+            let first = text.split("\n\n").next().unwrap_or(&text);
+            first.trim_start_matches("error: ").to_owned()
+        })
+    }
+
     /// Checks each setting; an error names the flag of the command line.
     ///
     /// # Errors
     /// [`InspectionError::Setting`]
     pub fn check(&self) -> Result<(), InspectionError> {
-        let Self {
-            drawing,
-            decision,
-            coverage_factor,
-            match_mm,
-            ..
-        } = self;
+        let Self { drawing, report } = self;
         let lengths = [
-            ("--k", Some(*coverage_factor)),
-            ("--match-mm", Some(*match_mm)),
+            ("--k", Some(report.coverage_factor)),
+            ("--match-mm", Some(drawing.match_mm)),
             ("--tolerance-mm", drawing.tolerance_mm),
             ("--position-mm", drawing.position_mm),
         ];
@@ -84,7 +110,7 @@ impl InspectionParams {
                 )));
             }
         }
-        let confidence = decision.confidence;
+        let confidence = report.confidence;
         if !(confidence > 0.5 && confidence < 1.0) {
             return Err(InspectionError::Setting(format!(
                 "--confidence {confidence} must be above 0.5 and below 1"
@@ -92,32 +118,4 @@ impl InspectionParams {
         }
         Ok(())
     }
-}
-
-/// General tolerance by name.
-///
-/// # Errors
-/// A text with the available names.
-pub fn general_tolerance(name: &str) -> Result<GeneralTolerance, String> {
-    let class = GeneralTolerance::of_name(name);
-    class.ok_or_else(|| {
-        format!(
-            "take one of {}",
-            GeneralTolerance::ALL.map(GeneralTolerance::name).join(", ")
-        )
-    })
-}
-
-/// Decision rule by name.
-///
-/// # Errors
-/// As [`general_tolerance`].
-pub fn decision_rule(name: &str) -> Result<DecisionRule, String> {
-    let rule = DecisionRule::of_name(name);
-    rule.ok_or_else(|| {
-        format!(
-            "take one of {}",
-            DecisionRule::ALL.map(DecisionRule::name).join(", ")
-        )
-    })
 }

@@ -7,7 +7,7 @@ use chrono::{DateTime, SecondsFormat, Utc};
 use nalgebra::Point3;
 
 use super::alignment::{Alignment, aligned};
-use super::drawing::{DrawnCharacteristic, PartDrawing};
+use super::drawing::{DrawingParams, DrawnCharacteristic, PartDrawing};
 use super::drawn_feature::shape_of;
 use super::measured::{CharacteristicMeasurement, is_of_mesh, measurement, missing_touches};
 use super::source::InspectionSource;
@@ -59,13 +59,16 @@ pub fn inspected(
     params: &InspectionParams,
 ) -> Result<Inspection, InspectionError> {
     let drawn = &drawing.characteristics;
-    let align = |method| aligned(&drawing.features, &source.features, method, params.match_mm);
-    let alignment = params.align.as_ref().map(align).transpose()?;
+    let DrawingParams {
+        match_mm, align, ..
+    } = &params.drawing;
+    let by = |method| aligned(&drawing.features, &source.features, method, *match_mm);
+    let alignment = align.as_ref().map(by).transpose()?;
     let file = alignment
         .as_ref()
         .map_or(&source.features, |alignment| &alignment.features);
     let groups = groups_of(drawn);
-    let found = match_all(drawn, &groups, file, params.match_mm * 1e-3);
+    let found = match_all(drawn, &groups, file, match_mm * 1e-3);
     let mut balloons = Vec::new();
     let (mut characteristics, mut runs) = (
         vec![CharacteristicRecord::default(); drawn.len()],
@@ -87,7 +90,7 @@ pub fn inspected(
                     .as_ref()
                     .and_then(|datum| found_feature(datum, file)),
             };
-            let measured = matched.measured(file, params.align.is_some());
+            let measured = matched.measured(file, align.is_some());
             characteristics[at] = matched.record(place, &measured, params);
             runs[at] = measured.runs;
         }
@@ -343,7 +346,7 @@ impl MatchedCharacteristic<'_> {
         params: &InspectionParams,
     ) -> CharacteristicRecord {
         let (drawn, nominal) = (self.drawn, &self.drawn.nominal);
-        let (assessment, why) = self.assessed(measured.number, &params.decision);
+        let (assessment, why) = self.assessed(measured.number, &params.report.decision());
         let mut record = CharacteristicRecord {
             number,
             name: nominal.name.clone(),
@@ -369,7 +372,7 @@ impl MatchedCharacteristic<'_> {
         };
         let std = measured.number.and_then(|number| number.std);
         let actual = measured.number.map(|number| number.value);
-        let expanded = std.map(|std| std * params.coverage_factor);
+        let expanded = std.map(|std| std * params.report.coverage_factor);
         for (name, number) in [
             ("nominal", Some(nominal.nominal())),
             ("lower_limit", drawn.limits.lower),
@@ -443,14 +446,14 @@ fn record_of(
         .into_iter()
         .chain(source.files.iter().cloned());
     InspectionRecord {
-        part: params.part.clone(),
-        serial: params.serial.clone(),
-        operator: params.operator.clone(),
+        part: params.report.part.clone(),
+        serial: params.report.serial.clone(),
+        operator: params.report.operator.clone(),
         date: DateTime::<Utc>::from(SystemTime::now()).to_rfc3339_opts(SecondsFormat::Secs, true),
         program: format!("touchup {VERSION}"),
-        rule: params.decision.rule.name().to_owned(),
-        confidence: params.decision.confidence,
-        coverage_factor: params.coverage_factor,
+        rule: params.report.rule.name().to_owned(),
+        confidence: params.report.confidence,
+        coverage_factor: params.report.coverage_factor,
         verdict: verdict.name().to_owned(),
         counts,
         files: files.collect(),

@@ -728,7 +728,8 @@ macro_rules! parameters {
     };
 }
 
-/// Declares an enum whose variants have names: `ALL`, `name`, `of_name` and `Display`.
+/// Declares an enum whose variants have names: `ALL`, `name`, `of_name`, `Display`
+/// and `FromStr`.
 #[macro_export]
 macro_rules! names {
     (
@@ -760,6 +761,15 @@ macro_rules! names {
         impl ::std::fmt::Display for $Name {
             fn fmt(&self, f: &mut ::std::fmt::Formatter<'_>) -> ::std::fmt::Result {
                 f.write_str(self.name())
+            }
+        }
+
+        impl ::std::str::FromStr for $Name {
+            type Err = String;
+
+            fn from_str(name: &str) -> Result<Self, String> {
+                let all = || Self::ALL.map(Self::name).join(", ");
+                Self::of_name(name).ok_or_else(|| format!("take one of {}", all()))
             }
         }
     };

@@ -7,10 +7,8 @@ use clap::Args;
 use crate::cli::common::pictures::ViewFlag;
 use crate::cli::common::progress::WorkProgress;
 use crate::cli::{CliError, check_outputs};
-use touchup_features::conformity::{DecisionParams, DecisionRule, GeneralTolerance};
 use touchup_inspect::{
-    AlignmentMethod, DrawingParams, InspectionParams, InspectionSource, ReportFiles, decision_rule,
-    general_tolerance,
+    DrawingParams, InspectionParams, InspectionSource, ReportFiles, ReportParams,
 };
 use touchup_io::mesh_file::MeshUnit;
 
@@ -23,26 +21,8 @@ pub(in crate::cli) struct InspectArguments {
     /// with the nominal features
     #[arg(long, value_name = "FILE", required_unless_present = "write_nominal")]
     pub nominal: Option<PathBuf>,
-    /// Unit of the coordinates in the CAD mesh of --nominal
-    #[arg(long, value_name = "U", default_value = "mm")]
-    pub nominal_unit: MeshUnit,
-    /// General tolerance for sizes without their own
-    #[arg(long, value_name = "CLASS", value_parser = general_tolerance, conflicts_with = "tolerance_mm")]
-    pub general: Option<GeneralTolerance>,
-    /// Tolerance ± for all sizes without their own, mm; instead of --general
-    #[arg(long, value_name = "T")]
-    pub tolerance_mm: Option<f64>,
-    /// With a CAD mesh: also the position of each hole, slot, pocket and boss, within a zone of
-    /// this diameter, mm
-    #[arg(long, value_name = "D")]
-    pub position_mm: Option<f64>,
-    /// Largest distance across the axis between the centres of a feature and its nominal one, mm
-    #[arg(long, value_name = "R", default_value_t = InspectionParams::default().match_mm)]
-    pub match_mm: f64,
-    /// Aligns drawing and part: best-fit, over all common features; or datums=NAME,NAME,NAME, names
-    /// of characteristics, primary to tertiary. Positions are then in the drawing's frame
-    #[arg(long, value_name = "HOW")]
-    pub align: Option<AlignmentMethod>,
+    #[command(flatten)]
+    drawing: DrawingParams,
     /// Writes nominal values for editing, CSV or JSON, from the CAD mesh of --nominal or else from
     /// FEATURES; inspects nothing
     #[arg(long, value_name = "FILE")]
@@ -59,24 +39,8 @@ pub(in crate::cli) struct InspectArguments {
     /// Scene of the touches, for the state of its calibration; default: the session's
     #[arg(long, value_name = "YAML")]
     pub scene: Option<PathBuf>,
-    /// Decision rule: guard bands, or the measured value alone
-    #[arg(long, value_name = "RULE", value_parser = decision_rule, default_value = DecisionParams::default().rule.name())]
-    pub rule: DecisionRule,
-    /// Minimum probability of conformity for a pass, and of nonconformity for a fail
-    #[arg(long, value_name = "P", default_value_t = DecisionParams::default().confidence)]
-    pub confidence: f64,
-    /// Coverage factor of the expanded uncertainties U = k u
-    #[arg(long, value_name = "K", default_value_t = InspectionParams::default().coverage_factor)]
-    pub k: f64,
-    /// Name or number of the part
-    #[arg(long, value_name = "NAME")]
-    pub part: Option<String>,
-    /// Serial number of the part
-    #[arg(long, value_name = "S")]
-    pub serial: Option<String>,
-    /// Name of the inspector
-    #[arg(long, value_name = "NAME")]
-    pub operator: Option<String>,
+    #[command(flatten)]
+    report: ReportParams,
     #[command(flatten)]
     pub view: ViewFlag,
     /// Output: the report, one printable HTML file
@@ -128,22 +92,8 @@ impl InspectArguments {
     /// Parameters of the inspection.
     pub(super) fn params(&self) -> InspectionParams {
         InspectionParams {
-            drawing: DrawingParams {
-                unit: self.nominal_unit,
-                general: self.general,
-                tolerance_mm: self.tolerance_mm,
-                position_mm: self.position_mm,
-            },
-            decision: DecisionParams {
-                rule: self.rule,
-                confidence: self.confidence,
-            },
-            coverage_factor: self.k,
-            match_mm: self.match_mm,
-            align: self.align.clone(),
-            part: self.part.clone(),
-            serial: self.serial.clone(),
-            operator: self.operator.clone(),
+            drawing: self.drawing.clone(),
+            report: self.report.clone(),
         }
     }
 

@@ -1,11 +1,12 @@
 //! Request of a report by a page: the source of the nominal values, and the flags of `touchup
 //! inspect`.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
-use touchup_inspect::{InspectionParams, decision_rule, general_tolerance};
+use touchup_inspect::InspectionParams;
 use touchup_io::mesh_file::MeshUnit;
 use touchup_io::nominal_file::is_nominal_file;
 use touchup_io::session_folder::SessionFolder;
@@ -33,7 +34,6 @@ pub(in crate::page) enum NominalSource {
 
 /// The query of a request; defaults are those of the command line.
 #[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
 pub(in crate::page) struct ReportRequest {
     pub nominal: NominalSource,
     /// name of the uploaded file, or of the file in the session folder
@@ -41,17 +41,9 @@ pub(in crate::page) struct ReportRequest {
     file: String,
     /// unit of a CAD mesh; default: that of the session
     unit: Option<MeshUnit>,
-    general: Option<String>,
-    tolerance_mm: Option<f64>,
-    position_mm: Option<f64>,
-    match_mm: Option<f64>,
-    align: Option<String>,
-    rule: Option<String>,
-    confidence: Option<f64>,
-    k: Option<f64>,
-    part: Option<String>,
-    serial: Option<String>,
-    operator: Option<String>,
+    /// values of the flags of `touchup inspect`, by their names
+    #[serde(flatten)]
+    settings: BTreeMap<String, String>,
 }
 
 impl ReportRequest {
@@ -62,23 +54,16 @@ impl ReportRequest {
     /// # Errors
     /// In words: an invalid value.
     pub fn params(&self, unit: MeshUnit) -> Result<InspectionParams, String> {
-        let mut params = InspectionParams::default();
-        params.drawing.unit = self.unit.unwrap_or(unit);
-        params.drawing.general = read("general", self.general.as_deref(), general_tolerance)?;
-        (params.drawing.tolerance_mm, params.drawing.position_mm) =
-            (self.tolerance_mm, self.position_mm);
-        if params.drawing.general.is_some() && params.drawing.tolerance_mm.is_some() {
-            return Err("general and tolerance_mm exclude each other: leave one out".to_owned());
-        }
-        params.decision.rule =
-            read("rule", self.rule.as_deref(), decision_rule)?.unwrap_or(params.decision.rule);
-        params.decision.confidence = self.confidence.unwrap_or(params.decision.confidence);
-        params.coverage_factor = self.k.unwrap_or(params.coverage_factor);
-        params.match_mm = self.match_mm.unwrap_or(params.match_mm);
-        params.align = read("align", self.align.as_deref(), str::parse)?;
-        params.part = text("part", &self.part)?;
-        params.serial = text("serial", &self.serial)?;
-        params.operator = text("operator", &self.operator)?;
+        let unit = ("nominal_unit", self.unit.unwrap_or(unit).name());
+        let settings = self
+            .settings
+            .iter()
+            .map(|(name, value)| (&**name, &**value));
+        let mut params = InspectionParams::named(settings.chain([unit]))?;
+        let report = &mut params.report;
+        report.part = text("part", &report.part)?;
+        report.serial = text("serial", &report.serial)?;
+        report.operator = text("operator", &report.operator)?;
         params.check().map_err(|error| error.to_string())?;
         Ok(params)
     }
@@ -123,17 +108,6 @@ impl ReportRequest {
     }
 }
 
-/// Parsed value of a field; an error names the field.
-fn read<T>(
-    field: &str,
-    text: Option<&str>,
-    of: fn(&str) -> Result<T, String>,
-) -> Result<Option<T>, String> {
-    text.map(of)
-        .transpose()
-        .map_err(|why| format!("{field}: {why}"))
-}
-
 /// A text of one line; `None` if empty.
 fn text(name: &str, given: &Option<String>) -> Result<Option<String>, String> {
     let Some(text) = given
@@ -154,8 +128,8 @@ fn text(name: &str, given: &Option<String>) -> Result<Option<String>, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use touchup_features::conformity::DecisionParams;
-    use touchup_inspect::DrawingParams;
+    use touchup_features::conformity::{DecisionRule, GeneralTolerance};
+    use touchup_inspect::{DrawingParams, ReportParams};
 
     fn request(json: serde_json::Value) -> ReportRequest {
         serde_json::from_value(json).unwrap()
@@ -167,45 +141,41 @@ mod tests {
         let params = request(serde_json::json!({ "nominal": "part" }))
             .params(MeshUnit::Inch)
             .unwrap();
-        assert_eq!((params.coverage_factor, params.match_mm), (2.0, 1.5));
-        assert_eq!(
-            (params.decision.rule.name(), params.decision.confidence),
-            ("iso14253", 0.95)
-        );
+        let InspectionParams { drawing, report } = params;
+        assert_eq!((report.coverage_factor, drawing.match_mm), (2.0, 1.5));
+        assert_eq!((report.rule.name(), report.confidence), ("iso14253", 0.95));
         assert!(
-            params.drawing.general.is_none()
-                && params.drawing.unit == MeshUnit::Inch
-                && params.part.is_none()
+            drawing.general.is_none() && drawing.unit == MeshUnit::Inch && report.part.is_none()
         );
     }
 
     #[test]
     fn each_field_is_the_setting_that_the_flag_of_its_name_is() {
         let asked = serde_json::json!({
-            "nominal": "part", "unit": "inch", "general": "iso2768-f", "position_mm": 0.2, "match_mm": 0.5, "align": "best-fit",
-            "rule": "simple", "confidence": 0.9, "k": 3.0, "part": " Plate 4711 ", "serial": "SN 1", "operator": "R. Ö",
+            "nominal": "part", "unit": "inch", "general": "iso2768-f", "position_mm": "0.2", "match_mm": "0.5", "align": "best-fit",
+            "rule": "simple", "confidence": "0.9", "k": "3", "part": " Plate 4711 ", "serial": "SN 1", "operator": "R. Ö",
         });
         let params = request(asked).params(MeshUnit::Metre).unwrap();
         let expected = InspectionParams {
             drawing: DrawingParams {
                 unit: MeshUnit::Inch,
-                general: Some(general_tolerance("iso2768-f").unwrap()),
+                general: Some(GeneralTolerance::Fine),
                 tolerance_mm: None,
                 position_mm: Some(0.2),
+                match_mm: 0.5,
+                align: Some("best-fit".parse().unwrap()),
             },
-            decision: DecisionParams {
-                rule: decision_rule("simple").unwrap(),
+            report: ReportParams {
+                rule: DecisionRule::Simple,
                 confidence: 0.9,
+                coverage_factor: 3.0,
+                part: Some("Plate 4711".to_owned()),
+                serial: Some("SN 1".to_owned()),
+                operator: Some("R. Ö".to_owned()),
             },
-            coverage_factor: 3.0,
-            match_mm: 0.5,
-            align: Some("best-fit".parse().unwrap()),
-            part: Some("Plate 4711".to_owned()),
-            serial: Some("SN 1".to_owned()),
-            operator: Some("R. Ö".to_owned()),
         };
         assert_eq!(format!("{params:?}"), format!("{expected:?}"));
-        let own = serde_json::json!({ "nominal": "part", "tolerance_mm": 0.1 });
+        let own = serde_json::json!({ "nominal": "part", "tolerance_mm": "0.1" });
         let params = request(own).params(MeshUnit::Metre).unwrap();
         assert_eq!(params.drawing.tolerance_mm, Some(0.1));
     }
@@ -213,26 +183,29 @@ mod tests {
     #[test]
     fn what_is_no_value_is_refused_in_words() {
         for (field, value, words) in [
-            ("general", "iso2768-x".into(), "iso2768-f, iso2768-m"),
-            ("rule", "hope".into(), "iso14253"),
-            ("align", "icp".into(), "align: take best-fit, or datums="),
-            ("confidence", 0.5.into(), "above 0.5 and below 1"),
-            ("k", 0.0.into(), "--k 0 must be above 0"),
-            (
-                "tolerance_mm",
-                serde_json::json!(-1.0),
-                "--tolerance-mm -1 must be above 0",
-            ),
-            ("part", "x".repeat(201).into(), "up to 200 characters"),
-            ("operator", "a\nb".into(), "in one line"),
+            ("general", "iso2768-x", "iso2768-f, iso2768-m"),
+            ("rule", "hope", "iso14253"),
+            ("align", "icp", "'--align <HOW>': take best-fit, or datums="),
+            ("confidence", "0.5", "above 0.5 and below 1"),
+            ("confidence", "much", "'much' for '--confidence <P>'"),
+            ("k", "0", "--k 0 must be above 0"),
+            ("tolerance_mm", "-1", "--tolerance-mm -1 must be above 0"),
+            ("part", &*"x".repeat(201), "up to 200 characters"),
+            ("operator", "a\nb", "in one line"),
+            ("out", "/etc/passwd", "'--out'"),
+            ("help", "", "'--help'"),
+            ("nominal_unit", "mm", "multiple times"),
+            ("", "", "'--'"),
         ] {
             let mut asked = serde_json::json!({ "nominal": "part" });
-            asked[field] = value;
+            asked[field] = value.into();
             let why = request(asked).params(MeshUnit::Millimetre).unwrap_err();
             assert!(why.contains(words), "{why}");
         }
-        let unknown = serde_json::json!({ "nominal": "part", "out": "/etc/passwd" });
-        assert!(serde_json::from_value::<ReportRequest>(unknown).is_err());
+        let both =
+            serde_json::json!({ "nominal": "part", "general": "iso2768-f", "tolerance_mm": "1" });
+        let why = request(both).params(MeshUnit::Millimetre).unwrap_err();
+        assert!(why.contains("cannot be used with"), "{why}");
     }
 
     #[test]
