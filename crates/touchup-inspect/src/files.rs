@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use clap::Args;
+
 use super::InspectionError;
 use super::calibration::calibration_of;
 use super::page::{ReportInput, page};
@@ -14,15 +16,19 @@ use touchup_io::qif_file::write_qif;
 use touchup_io::session_folder::write_text_file;
 
 /// Paths of the report's files; `None`: not written.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Args)]
 pub struct ReportFiles {
-    /// one printable file
+    /// Output: the report, one printable HTML file
+    #[arg(long = "out", value_name = "HTML")]
     pub html: Option<PathBuf>,
-    /// the characteristics as a table
+    /// Output: the characteristics as a table
+    #[arg(long, value_name = "CSV")]
     pub csv: Option<PathBuf>,
-    /// the whole report, as one object
+    /// the whole report, as one object; on the command line it goes to stdout
+    #[arg(skip)]
     pub json: Option<PathBuf>,
-    /// QIF 3.0
+    /// Output: the results as QIF 3.0
+    #[arg(long, value_name = "QIF")]
     pub qif: Option<PathBuf>,
 }
 

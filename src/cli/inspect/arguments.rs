@@ -43,15 +43,8 @@ pub(in crate::cli) struct InspectArguments {
     report: ReportParams,
     #[command(flatten)]
     pub view: ViewFlag,
-    /// Output: the report, one printable HTML file
-    #[arg(long, value_name = "HTML")]
-    pub out: Option<PathBuf>,
-    /// Output: the characteristics as a table
-    #[arg(long, value_name = "CSV")]
-    pub csv: Option<PathBuf>,
-    /// Output: the results as QIF 3.0
-    #[arg(long, value_name = "QIF")]
-    pub qif: Option<PathBuf>,
+    #[command(flatten)]
+    pub files: ReportFiles,
     /// Prints the results as JSON
     #[arg(long)]
     pub json: bool,
@@ -60,7 +53,8 @@ pub(in crate::cli) struct InspectArguments {
 impl InspectArguments {
     /// Checks flags and outputs before the work begins.
     pub(super) fn check(&self) -> Result<(), CliError> {
-        let outputs = [("--out", ".html", &self.out), ("--csv", ".csv", &self.csv)];
+        let ReportFiles { html, csv, qif, .. } = &self.files;
+        let outputs = [("--out", ".html", html), ("--csv", ".csv", csv)];
         let inputs = [
             Some(&self.features),
             self.nominal.as_ref(),
@@ -69,14 +63,13 @@ impl InspectArguments {
             self.scene.as_ref(),
         ];
         check_outputs(&outputs, &inputs, "read: choose another place")?;
-        let is_xml = self
-            .qif
+        let is_xml = qif
             .as_ref()
             .and_then(|path| path.extension())
             .is_some_and(|end| end.eq_ignore_ascii_case("xml"));
         let ending = if is_xml { ".xml" } else { ".qif" };
         check_outputs(
-            &[("--qif", ending, &self.qif)],
+            &[("--qif", ending, qif)],
             &inputs,
             "read: choose another place",
         )?;
@@ -94,16 +87,6 @@ impl InspectArguments {
         InspectionParams {
             drawing: self.drawing.clone(),
             report: self.report.clone(),
-        }
-    }
-
-    /// Files of the report; JSON goes to stdout.
-    pub(super) fn files(&self) -> ReportFiles {
-        ReportFiles {
-            html: self.out.clone(),
-            csv: self.csv.clone(),
-            json: None,
-            qif: self.qif.clone(),
         }
     }
 

@@ -50,5 +50,5 @@ fn write(
         mesh_unit: arguments.mesh_unit,
         view: arguments.view.direction()?,
     };
-    Ok(arguments.files().write(source, inspected, &picture)?)
+    Ok(arguments.files.write(source, inspected, &picture)?)
 }
