@@ -38,7 +38,7 @@ mod whatif;
 pub use common::error::CliError;
 pub use compare::comparison_json;
 pub use simulate::{ScannerKind, Side, Simulation, SimulationSettings};
-pub use simulated_world::OffFactor;
+pub use simulated_world::{OffFactor, world_named};
 pub use sweep::plan_sweep;
 pub use whatif::what_if_json;
 

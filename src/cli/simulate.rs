@@ -16,6 +16,7 @@ use touchup_geometry::mesh::TriMesh;
 use touchup_io::atomic::{create_folder, write_atomically};
 use touchup_io::mesh_file::{MeshUnit, write_mesh};
 use touchup_io::recording::{Record, Topics, write_recording};
+use touchup_method::names;
 use touchup_method::stylus::{MarkerFrame, Message};
 use touchup_session::scan::{Scan, read_scan};
 use touchup_sim::{
@@ -104,32 +105,15 @@ pub struct SimulationSettings {
     pub sides: Vec<Side>,
 }
 
-impl Default for SimulationSettings {
-    fn default() -> Self {
-        Self {
-            seed: 1,
-            world: None,
-            told_off: Vec::new(),
-            tip_radius_mm: None,
-            stiffness_n_per_mm: None,
-            friction: None,
-            scan_edge_mm: None,
-            scan_noise_mm: None,
-            scanner: None,
-            sides: vec![Side {
-                towards: Vector3::z_axis(),
-            }],
-        }
+names! {
+    /// Quality of a scanner.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+    pub enum ScannerKind {
+        /// Hand-held: noisy, rounded, holes closed over
+        Cheap = "cheap",
+        /// Stationary: fine and exact, without the floors of deep holes
+        Good = "good",
     }
-}
-
-/// Quality of a scanner.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum ScannerKind {
-    /// Hand-held: noisy, rounded, holes closed over
-    Cheap,
-    /// Stationary: fine and exact, without the floors of deep holes
-    Good,
 }
 
 /// Side of the part.

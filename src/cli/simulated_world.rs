@@ -69,10 +69,13 @@ impl OffFactor {
     }
 }
 
-/// Reads the name of a world.
-pub(super) fn world_named(name: &str) -> Result<SimWorld, String> {
-    let names = SimWorld::ALL.map(SimWorld::name).join(", ");
-    SimWorld::named(name).ok_or_else(|| format!("there is no world {name}: take one of {names}"))
+/// World of a name.
+///
+/// # Errors
+/// A text with the available names.
+pub fn world_named(name: &str) -> Result<SimWorld, String> {
+    name.parse()
+        .map_err(|known| format!("there is no world {name}: {known}"))
 }
 
 /// Writes the calibrated scene: for `refine --scene`.

@@ -2,9 +2,10 @@
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use touchup::cli::{CliError, OffFactor, ScannerKind, Side, Simulation, SimulationSettings};
+use touchup::cli::{
+    CliError, OffFactor, ScannerKind, Side, Simulation, SimulationSettings, world_named,
+};
 use touchup_method::stylus::WrenchFrame;
-use touchup_sim::SimWorld;
 
 use crate::arrays::{CompactMesh, MeshArrays, mesh_of, messages_into};
 use crate::failure::{at_work, exception, usage};
@@ -34,7 +35,11 @@ pub fn simulate<'py>(
     let Simulation { scan, touch, scene } = at_work(py, || {
         let settings = SimulationSettings {
             seed,
-            world: world.as_deref().map(world_named).transpose()?,
+            world: world
+                .as_deref()
+                .map(world_named)
+                .transpose()
+                .map_err(usage)?,
             told_off: told_off
                 .iter()
                 .map(|text| text.parse::<OffFactor>().map_err(usage))
@@ -61,18 +66,7 @@ pub fn simulate<'py>(
     Ok(into)
 }
 
-fn world_named(name: &str) -> Result<SimWorld, CliError> {
-    let names = SimWorld::ALL.map(SimWorld::name).join(", ");
-    SimWorld::named(name)
-        .ok_or_else(|| usage(format!("there is no world {name}: take one of {names}")))
-}
-
 fn scanner_named(name: &str) -> Result<ScannerKind, CliError> {
-    match name {
-        "cheap" => Ok(ScannerKind::Cheap),
-        "good" => Ok(ScannerKind::Good),
-        other => Err(usage(format!(
-            "scanner {other:?} must be \"cheap\" or \"good\""
-        ))),
-    }
+    ScannerKind::of_name(name)
+        .ok_or_else(|| usage(format!("scanner {name:?} must be \"cheap\" or \"good\"")))
 }

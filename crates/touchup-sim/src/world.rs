@@ -19,20 +19,23 @@ use crate::paths::path::{PathParams, Stroke, plan_mesh, plan_walls};
 use crate::surfaces::plate::Plate;
 use crate::surfaces::surface::Surface;
 use touchup_geometry::mesh::TriMesh;
+use touchup_method::names;
 
-/// A world by its name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SimWorld {
-    /// A stylus of the workshop under a good camera.
-    WorkshopStylus,
-    /// A marker body far from its tracker: slow poses, late and missing.
-    OpticalTracker,
-    /// A UR led by hand: exact poses, a coarse force sensor.
-    Ur,
-    /// A long thin probe that bends several times more sideways than along its shaft.
-    SoftProbe,
-    /// Someone who presses unevenly, taps and scrubs, over a poor scan.
-    CarelessOperator,
+names! {
+    /// A world by its name.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum SimWorld {
+        /// A stylus of the workshop under a good camera.
+        WorkshopStylus = "workshop_stylus",
+        /// A marker body far from its tracker: slow poses, late and missing.
+        OpticalTracker = "optical_tracker",
+        /// A UR led by hand: exact poses, a coarse force sensor.
+        Ur = "ur",
+        /// A long thin probe that bends several times more sideways than along its shaft.
+        SoftProbe = "soft_probe",
+        /// Someone who presses unevenly, taps and scrubs, over a poor scan.
+        CarelessOperator = "careless_operator",
+    }
 }
 
 /// Ranges of a world's draws. Each pair is the smallest and the largest value, all equally likely;
@@ -266,31 +269,6 @@ impl Draw {
 }
 
 impl SimWorld {
-    /// All worlds.
-    pub const ALL: [Self; 5] = [
-        Self::WorkshopStylus,
-        Self::OpticalTracker,
-        Self::Ur,
-        Self::SoftProbe,
-        Self::CarelessOperator,
-    ];
-
-    /// The world of this name; `None` for an unknown name.
-    pub fn named(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|world| world.name() == name)
-    }
-
-    /// Its name.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::WorkshopStylus => "workshop_stylus",
-            Self::OpticalTracker => "optical_tracker",
-            Self::Ur => "ur",
-            Self::SoftProbe => "soft_probe",
-            Self::CarelessOperator => "careless_operator",
-        }
-    }
-
     /// Standard deviations of the reported values in this world.
     pub fn calibration_stds(self) -> CalibrationStds {
         self.ranges().stds

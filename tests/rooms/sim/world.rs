@@ -99,7 +99,7 @@ fn delay(moments: &[TrueState], wrenches: &[StampedWrench]) -> f64 {
 #[test]
 fn each_world_draws_within_its_ranges_and_another_truth_for_each_seed() {
     for world in SimWorld::ALL {
-        assert_eq!(SimWorld::named(world.name()), Some(world));
+        assert_eq!(SimWorld::of_name(world.name()), Some(world));
         let drawn: Vec<_> = (0..40).map(|seed| world.draw(seed).unwrap()).collect();
         for (i, value) in drawn[0].values.iter().enumerate() {
             let of_seeds: Vec<_> = drawn.iter().map(|drawn| drawn.values[i]).collect();
@@ -123,7 +123,7 @@ fn each_world_draws_within_its_ranges_and_another_truth_for_each_seed() {
         }
         assert_eq!(drawn[3], world.draw(3).unwrap());
     }
-    assert_eq!(SimWorld::named("judged"), None);
+    assert_eq!(SimWorld::of_name("judged"), None);
 }
 
 #[test]
