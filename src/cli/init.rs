@@ -47,18 +47,14 @@ pub(super) fn init(arguments: &InitArguments) -> Result<Losses, CliError> {
         ),
     )?;
     check_place(out)?;
-    let mut settings: Vec<_> = told.settings().collect();
-    settings.extend(
-        scan.as_ref()
-            .map(|file| Setting::scalar("scan.file", format!("'{}'", file.display()))),
-    );
-    settings.push(Setting::scalar("scan.unit", mesh_unit));
+    let mut settings = told.settings();
+    settings.extend(scan.as_ref().map(|file| Setting::file("scan.file", file)));
+    settings.push(Setting::word("scan.unit", mesh_unit));
 
-    let mut expected = Scene::default();
-    let part = expected.scan.get_or_insert_default();
-    (part.file, part.unit) = (scan.clone(), *mesh_unit);
-    told.tell(&mut expected, "")?;
-    let text = Scene::edited(&Scene::template(), &settings, "touchup init", &expected)?;
+    let mut scene = Scene::default();
+    scene.set(&settings)?;
+    told.tell(&mut scene, "")?;
+    let text = Scene::edited(&Scene::template(), &settings, "touchup init")?;
     write_atomically(out, |file| file.write_all(text.as_bytes())).map_err(not_written(out))?;
     print_result(&format!(
         "wrote {0}: touchup refine --scene {0} --bag RECORDING --out refined.ply",

@@ -262,18 +262,17 @@ fn a_scene_says_what_differs() {
     );
 }
 
-/// The radius is told by the text or by a flag; the default is nobody's word, and a point has none.
+/// The default radius is nobody's word, and a point has none.
 #[test]
 fn a_radius_is_told_by_somebody() {
-    let told = |yaml: &str, flag: Option<f64>| {
-        let mut scene = Scene::from_yaml(yaml).unwrap();
+    let told = |yaml: &str| {
+        let scene = Scene::from_yaml(yaml).unwrap();
         scene
-            .tell_radius(yaml, flag)
+            .require_radius(yaml)
             .map(|()| scene.tip_params().radius)
     };
-    assert_eq!(told("tip: { radius_mm: 2 }", None).unwrap(), 2e-3);
-    assert_eq!(told("tip: { radius_mm: 2 }", Some(3.0)).unwrap(), 3e-3);
-    assert_eq!(told("{ tip: off, patch: off }", None).unwrap(), 0.0);
+    assert_eq!(told("tip: { radius_mm: 2 }").unwrap(), 2e-3);
+    assert_eq!(told("{ tip: off, patch: off }").unwrap(), 0.0);
     for untold in [
         "{}",
         "tip:",
@@ -282,7 +281,7 @@ fn a_radius_is_told_by_somebody() {
     ] {
         if Scene::from_yaml(untold).is_ok() {
             assert!(
-                matches!(told(untold, None), Err(SceneError::NoRadius)),
+                matches!(told(untold), Err(SceneError::NoRadius)),
                 "{untold}"
             );
         }
@@ -690,11 +689,63 @@ fn calibrated(yaml: &str) -> Result<String, SceneError> {
         Setting::list("scan_to_space.position_mm", &[1.5, -2.0, 3.25]),
         Setting::list("scan_to_space.orientation_xyzw", &[0.0, 0.6, 0.0, 0.8]),
         Setting::list("tip.offset_mm", &[0.5, 0.0, -142.0]),
-        Setting::scalar("compensation.payload.mass_kg", 0.25),
-        Setting::scalar("compensation.payload.gravity_axes", "space"),
+        Setting::number("compensation.payload.mass_kg", 0.25),
+        Setting::word("compensation.payload.gravity_axes", "space"),
         Setting::list("compensation.bias.force_n", &[1.0, 2.0, 3.0]),
     ];
-    Scene::edited(yaml, &settings, "by a test", &expected)
+    let text = Scene::edited(yaml, &settings, "by a test")?;
+    assert_eq!(Scene::from_yaml(&text)?, expected, "{text}");
+    Ok(text)
+}
+
+/// Expected values by hand: the units are in the keys.
+#[test]
+fn settings_are_set_by_key_in_its_unit() {
+    let mut scene = Scene::from_yaml("{ tip: off, patch: off, uncertainty: off }").unwrap();
+    let settings = [
+        Setting::number("tip.stiffness_n_per_mm", 12.5),
+        Setting::number("uncertainty.radius_sigma_mm", 0.25),
+        Setting::file("scan.file", std::path::Path::new("it's.ply")),
+        Setting::word("scan.unit", "inch"),
+        Setting::list("robot.tip_position_mm", &[1.0, -2.0, 0.5]),
+        Setting::word("refine.step", "dp5"),
+    ];
+    scene.set(&settings).unwrap();
+    let tip = scene.tip.as_ref().unwrap();
+    assert_eq!(
+        (tip.ball.radius, tip.ball.stiffness),
+        (1.5e-3, Some(12.5e3))
+    );
+    assert_eq!(scene.uncertainty.unwrap().calibration.radius, 0.25e-3);
+    let scan = scene.scan.as_ref().unwrap();
+    assert_eq!(scan.file.as_deref(), Some(std::path::Path::new("it's.ply")));
+    assert_eq!((scan.unit, scan.quality.noise), (MeshUnit::Inch, 0.6e-3));
+    assert_eq!(
+        scene.robot.as_ref().unwrap().tip_position,
+        vector![1e-3, -2e-3, 0.5e-3]
+    );
+    assert_eq!(
+        scene.refine.as_ref().unwrap().step,
+        Some(StepRule::DormandPrince)
+    );
+
+    for wrong in [
+        Setting::number("tip.radius", 1.0),
+        Setting::number("tip", 1.0),
+        Setting::number("tip.radius_mm.of", 1.0),
+        Setting::word("tip.radius_mm", "wide"),
+    ] {
+        let error = Scene::default().set(&[wrong]).unwrap_err();
+        assert!(matches!(error, SceneError::Yaml { .. }), "{error}");
+    }
+    for not_finite in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        let mut scene = Scene::default();
+        let radius = [Setting::number("tip.radius_mm", not_finite)];
+        scene.set(&radius).unwrap();
+        let error = scene.validate().unwrap_err().to_string();
+        let said = format!("tip.radius_mm is {not_finite}; it must be 0 to 1000 mm");
+        assert!(error.starts_with(&said), "{error}");
+    }
 }
 
 /// The lines of `before` that are not in `after`, in order.

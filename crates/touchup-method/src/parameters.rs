@@ -224,6 +224,23 @@ pub trait Value: Sized {
         Self::of(written, unit)
     }
 
+    /// Sets the YAML value at `path` below this one; without a path, this one.
+    ///
+    /// # Errors
+    /// Errors of the deserializer; an unknown key.
+    fn set<'de, D: Deserializer<'de>>(
+        &mut self,
+        path: &[&str],
+        written: D,
+        unit: Unit,
+    ) -> Result<(), D::Error> {
+        if let Some(key) = path.first() {
+            return Err(D::Error::unknown_field(key, &[]));
+        }
+        *self = Self::of(Self::Written::deserialize(written)?, unit);
+        Ok(())
+    }
+
     /// Default section; `None` for other types.
     fn named() -> Option<Self> {
         None
@@ -394,6 +411,22 @@ impl<T: Value> Value for Option<T> {
             Some(written) if T::is_off(&written) => None,
             Some(written) => Some(T::of(written, unit)),
         }
+    }
+
+    fn set<'de, D: Deserializer<'de>>(
+        &mut self,
+        path: &[&str],
+        written: D,
+        unit: Unit,
+    ) -> Result<(), D::Error> {
+        if self.is_none() {
+            *self = T::named();
+        }
+        if let Some(value) = self {
+            return value.set(path, written, unit);
+        }
+        *self = Some(T::of(T::Written::deserialize(written)?, unit));
+        Ok(())
     }
 
     fn yaml(&self, unit: Unit) -> Option<String> {
@@ -707,6 +740,31 @@ macro_rules! parameters {
 
             fn is_off(written: &Self::Written) -> bool {
                 matches!(written, $crate::parameters::WrittenSection::Off)
+            }
+
+            #[allow(unused_variables)]
+            fn set<'de, D: ::serde::Deserializer<'de>>(
+                &mut self,
+                path: &[&str],
+                written: D,
+                _: $crate::parameters::Unit,
+            ) -> Result<(), D::Error> {
+                let (key, below) = path.split_first().unwrap_or((&"", &[]));
+                match *key {
+                    $($($key => $crate::parameters::Value::set(
+                        &mut self.$field,
+                        below,
+                        written,
+                        $crate::parameters!(@unit $($unit)?),
+                    ),)?)*
+                    $($(key if <$Part as $crate::parameters::Section>::keys().contains(&key) => {
+                        $crate::parameters::Value::set(&mut self.$part, path, written, $crate::parameters::Unit::ONE)
+                    })*)?
+                    key => Err(::serde::de::Error::unknown_field(
+                        key,
+                        <Self as $crate::parameters::Section>::keys(),
+                    )),
+                }
             }
 
             fn yaml(&self, _: $crate::parameters::Unit) -> Option<String> {

@@ -37,21 +37,19 @@ impl SceneSource {
     /// # Errors
     /// Those of [`Self::parsed`], and an unknown radius of the ball.
     pub fn read(&self) -> Result<Scene, CliError> {
-        let (mut scene, text) = self.parsed()?;
-        scene
-            .tell_radius(&text, None)
-            .map_err(|error| match error {
-                SceneError::NoRadius => CliError {
-                    kind: "usage",
-                    message:
-                        "the radius of the ball is not known: give tip.radius_mm in the scene, as \
+        let (scene, text) = self.parsed()?;
+        scene.require_radius(&text).map_err(|error| match error {
+            SceneError::NoRadius => CliError {
+                kind: "usage",
+                message:
+                    "the radius of the ball is not known: give tip.radius_mm in the scene, as \
                           scene={\"tip\": {\"radius_mm\": 1.5}}"
-                            .to_owned(),
-                    hint: None,
-                    exit_code: 2,
-                },
-                error => error.into(),
-            })?;
+                        .to_owned(),
+                hint: None,
+                exit_code: 2,
+            },
+            error => error.into(),
+        })?;
         Ok(scene)
     }
 }

@@ -41,7 +41,7 @@ pub(super) struct DraftScene {
 impl DraftScene {
     /// Refuses a scene without tip radius.
     pub fn require_radius(&self) -> Result<(), CliError> {
-        Ok(self.scene.clone().tell_radius(&self.text, None)?)
+        Ok(self.scene.require_radius(&self.text)?)
     }
 }
 

@@ -56,14 +56,14 @@ impl ToldFlags {
     }
 
     /// Settings of a scene, one for each flag.
-    pub fn settings(&self) -> impl Iterator<Item = Setting> {
-        let told = [
+    pub fn settings(&self) -> Vec<Setting> {
+        let flags = [
             ("tip.radius_mm", self.tip_radius_mm),
             ("tip.stiffness_n_per_mm", self.stiffness_n_per_mm),
             ("scan.noise_mm", self.scan_noise_mm),
         ];
-        told.into_iter()
-            .filter_map(|(key, number)| Some(Setting::scalar(key, number?)))
+        let given = |(key, number): (_, Option<f64>)| Some(Setting::number(key, number?));
+        flags.into_iter().filter_map(given).collect()
     }
 
     /// Applies the flags.
@@ -73,13 +73,10 @@ impl ToldFlags {
     /// # Errors
     /// A missing tip radius, and a flag out of its range.
     pub fn tell(&self, scene: &mut Scene, yaml: &str) -> Result<(), CliError> {
-        scene.tell_radius(yaml, self.tip_radius_mm)?;
-        if let Some(stiffness) = self.stiffness_n_per_mm {
-            scene.tip.get_or_insert_default().ball.stiffness = Some(stiffness * 1e3);
+        if self.tip_radius_mm.is_none() {
+            scene.require_radius(yaml)?;
         }
-        if let Some(noise_mm) = self.scan_noise_mm {
-            scene.scan.get_or_insert_default().quality.noise = noise_mm / 1e3;
-        }
+        scene.set(&self.settings())?;
         // the file was in range when read: a flag set any value out of range
         scene.validate().map_err(CliError::usage)
     }
@@ -94,15 +91,8 @@ impl ToldFlags {
             Some(path) => Scene::read_with_text(path)?.1,
             None => Scene::template_without_radius(),
         };
-        let mut expected = Scene::from_yaml(&yaml)?;
-        self.tell(&mut expected, &yaml)?;
-        let settings: Vec<_> = self.settings().collect();
-        Ok(Scene::edited(
-            &yaml,
-            &settings,
-            "given by flags",
-            &expected,
-        )?)
+        self.tell(&mut Scene::from_yaml(&yaml)?, &yaml)?;
+        Ok(Scene::edited(&yaml, &self.settings(), "given by flags")?)
     }
 }
 

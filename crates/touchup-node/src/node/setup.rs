@@ -94,17 +94,15 @@ fn scene_of(path: &Path, radius_mm: f64) -> Result<(Scene, String), SceneError> 
         true => (Scene::default(), Scene::template_without_radius()),
         false => Scene::read_with_text(path)?,
     };
-    let radius_mm = Some(radius_mm).filter(|mm| *mm > 0.0);
-    scene.tell_radius(&yaml, radius_mm)?;
-    scene.validate()?;
-    let Some(mm) = radius_mm else {
+    if radius_mm > 0.0 {
+        let settings = [Setting::number("tip.radius_mm", radius_mm)];
+        scene.set(&settings)?;
+        scene.validate()?;
+        let yaml = Scene::edited(&yaml, &settings, "parameter tip_radius_mm")?;
         return Ok((scene, yaml));
-    };
-    // scene of the text, without its files
-    let mut expected = Scene::from_yaml(&yaml)?;
-    expected.tell_radius(&yaml, radius_mm)?;
-    let set = [Setting::scalar("tip.radius_mm", mm)];
-    let yaml = Scene::edited(&yaml, &set, "parameter tip_radius_mm", &expected)?;
+    }
+    scene.require_radius(&yaml)?;
+    scene.validate()?;
     Ok((scene, yaml))
 }
 

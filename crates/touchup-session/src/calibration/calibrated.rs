@@ -33,8 +33,8 @@ impl CalibrationKind {
 
 /// A printable result of a calibration that changes a scene.
 pub trait CalibrationResult: Serialize + Display {
-    /// Sets the result in `scene`; returns the settings for its text, and one line on their source.
-    fn set_in(&self, scene: &mut Scene) -> (Vec<Setting>, String);
+    /// The settings of a scene by the result, and one line on their source.
+    fn settings(&self) -> (Vec<Setting>, String);
 }
 
 /// Result of a calibration, with doubts and losses.
@@ -78,16 +78,9 @@ pub fn calibrated_scene(
     found: &impl CalibrationResult,
     now: SystemTime,
 ) -> Result<String, SceneError> {
-    // without the files that it names, which are not part of the text
-    let mut expected = Scene::from_yaml(yaml)?;
-    let (settings, remark) = found.set_in(&mut expected);
+    let (settings, remark) = found.settings();
     let date = DateTime::<Utc>::from(now).date_naive();
-    Scene::edited(
-        yaml,
-        &settings,
-        &format!("{remark}{BEFORE_DATE}{date}"),
-        &expected,
-    )
+    Scene::edited(yaml, &settings, &format!("{remark}{BEFORE_DATE}{date}"))
 }
 
 /// Day of a calibration in the text of a scene, UTC; `None` if the text gives none.
@@ -106,8 +99,6 @@ mod tests {
     use std::fmt;
     use std::time::{Duration, UNIX_EPOCH};
 
-    use nalgebra::Vector3;
-
     use super::*;
 
     #[derive(Serialize)]
@@ -120,8 +111,7 @@ mod tests {
     }
 
     impl CalibrationResult for LongStylus {
-        fn set_in(&self, scene: &mut Scene) -> (Vec<Setting>, String) {
-            scene.tip.get_or_insert_default().offset = Some(Vector3::new(0.0, 0.0, -0.125));
+        fn settings(&self) -> (Vec<Setting>, String) {
             (
                 vec![Setting::list("tip.offset_mm", &[0.0, 0.0, -125.0])],
                 "tip: 7 poses".to_owned(),

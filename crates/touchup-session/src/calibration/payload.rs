@@ -14,7 +14,7 @@ use touchup_features::calibrate::{
     PayloadFit, PayloadParams, StaticPose, StaticSegmentFinder, StaticSegmentParams, fit_payload,
 };
 use touchup_io::tables::static_poses::read_static_poses;
-use touchup_method::stylus::{Payload, SensorBias, WrenchFrame};
+use touchup_method::stylus::WrenchFrame;
 use touchup_probing::execute::{NotReached, PayloadReadings};
 
 use super::calibrated::{Calibration, CalibrationResult};
@@ -22,7 +22,7 @@ use super::error::CalibrationError;
 use super::recording::CalibrationRecording;
 use super::vector::{Vector, rounded};
 use crate::reported;
-use crate::scene::{GravityAxes, PayloadSection, Scene, Setting};
+use crate::scene::{GravityAxes, Scene, Setting};
 
 /// Ratio of residual to noise above which the residual has another cause.
 const UNEXPLAINED: f64 = 5.0;
@@ -193,41 +193,23 @@ reported! {
 }
 
 impl CalibrationResult for PayloadFound {
-    fn set_in(&self, scene: &mut Scene) -> (Vec<Setting>, String) {
-        let digits = |values: &[f64; 3], digits| values.map(|x| rounded(x, digits));
-        let (mass_kg, gravity_m_per_s2) = (
-            rounded(self.mass_kg, 10),
-            digits(&self.gravity_m_per_s2, 10),
-        );
-        let centre_mm = digits(&self.centre_mm.value, 7);
-        let [force_n, torque_nm] =
-            [&self.bias_force_n, &self.bias_torque_nm].map(|bias| digits(&bias.value, 10));
-        let settings = vec![
-            Setting::scalar("compensation.payload.mass_kg", mass_kg),
-            Setting::list("compensation.payload.centre_mm", &centre_mm),
-            Setting::list("compensation.payload.gravity_m_per_s2", &gravity_m_per_s2),
-            Setting::scalar(
-                "compensation.payload.gravity_axes",
-                GravityAxes::Space.name(),
-            ),
-            Setting::list("compensation.bias.force_n", &force_n),
-            Setting::list("compensation.bias.torque_nm", &torque_nm),
-        ];
-        let compensation = scene.compensation.get_or_insert_default();
-        let p_sc = Vector3::from(centre_mm) / 1e3;
-        let payload = Payload {
-            mass: mass_kg,
-            p_sc,
-            gravity_o: gravity_m_per_s2.into(),
+    fn settings(&self) -> (Vec<Setting>, String) {
+        let list = |path, values: &[f64; 3], digits| {
+            Setting::list(path, &values.map(|x| rounded(x, digits)))
         };
-        compensation.payload = Some(PayloadSection {
-            gravity_axes: GravityAxes::Space,
-            payload,
-        });
-        compensation.bias = Some(SensorBias {
-            force: force_n.into(),
-            torque: torque_nm.into(),
-        });
+        let [force_n, torque_nm] = [&self.bias_force_n.value, &self.bias_torque_nm.value];
+        let settings = vec![
+            Setting::number("compensation.payload.mass_kg", rounded(self.mass_kg, 10)),
+            list("compensation.payload.centre_mm", &self.centre_mm.value, 7),
+            list(
+                "compensation.payload.gravity_m_per_s2",
+                &self.gravity_m_per_s2,
+                10,
+            ),
+            Setting::word("compensation.payload.gravity_axes", GravityAxes::Space),
+            list("compensation.bias.force_n", force_n, 10),
+            list("compensation.bias.torque_nm", torque_nm, 10),
+        ];
         let remark = format!(
             "payload: {} static segments, residuals {:.3} N and {:.4} N·m rms",
             self.static_segments, self.residual_force_n, self.residual_torque_nm
@@ -288,7 +270,7 @@ pub struct WeighedFound {
 }
 
 impl CalibrationResult for WeighedFound {
-    fn set_in(&self, scene: &mut Scene) -> (Vec<Setting>, String) {
+    fn settings(&self) -> (Vec<Setting>, String) {
         let PayloadFound {
             static_segments,
             residual_force_n,
@@ -297,11 +279,8 @@ impl CalibrationResult for WeighedFound {
         } = self.payload;
         let payload_kg = rounded(self.payload.mass_kg, 10);
         let payload_centre_mm = self.payload.centre_mm.value.map(|mm| rounded(mm, 7));
-        let robot = scene.robot.get_or_insert_default();
-        (robot.payload_mass, robot.payload_centre) =
-            (payload_kg, Vector3::from(payload_centre_mm) / 1e3);
         let settings = vec![
-            Setting::scalar("robot.payload_kg", payload_kg),
+            Setting::number("robot.payload_kg", payload_kg),
             Setting::list("robot.payload_centre_mm", &payload_centre_mm),
         ];
         let remark = format!(

@@ -14,7 +14,7 @@ use super::error::CalibrationError;
 use super::recording::CalibrationRecording;
 use super::vector::rounded;
 use crate::reported;
-use crate::scene::{GravityAxes, ScanToSpaceSection, Scene, Setting};
+use crate::scene::{GravityAxes, Scene, Setting};
 
 /// Fits the pose of the scan to a table of pairs ([`touchup_io::tables::pairs_file`]).
 ///
@@ -154,16 +154,11 @@ reported! {
 }
 
 impl CalibrationResult for ScanFound {
-    fn set_in(&self, scene: &mut Scene) -> (Vec<Setting>, String) {
+    fn settings(&self) -> (Vec<Setting>, String) {
         let ScanMotion {
             position_mm,
             orientation_xyzw,
         } = self.scan_to_space;
-        let position = Vector3::from(position_mm) / 1e3;
-        scene.scan_to_space = Some(ScanToSpaceSection {
-            position,
-            orientation_xyzw,
-        });
         let settings = vec![
             Setting::list("scan_to_space.position_mm", &position_mm),
             Setting::list("scan_to_space.orientation_xyzw", &orientation_xyzw),

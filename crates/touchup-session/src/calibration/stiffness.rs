@@ -7,7 +7,7 @@ use touchup_probing::execute::Repeatability;
 use super::calibrated::CalibrationResult;
 use super::vector::rounded;
 use crate::reported;
-use crate::scene::{Scene, Setting};
+use crate::scene::Setting;
 
 reported! {
     /// Stiffness of arm and probe together.
@@ -22,15 +22,14 @@ reported! {
 }
 
 impl CalibrationResult for StiffnessFound {
-    fn set_in(&self, scene: &mut Scene) -> (Vec<Setting>, String) {
+    fn settings(&self) -> (Vec<Setting>, String) {
         let stiffness_n_per_mm = rounded(self.stiffness_n_per_mm, 3);
-        scene.tip.get_or_insert_default().ball.stiffness = Some(stiffness_n_per_mm * 1e3);
         let remark = format!(
             "stiffness: {} presses, ± {:.3} N/mm",
             self.touches, self.std_n_per_mm
         );
         (
-            vec![Setting::scalar(
+            vec![Setting::number(
                 "tip.stiffness_n_per_mm",
                 stiffness_n_per_mm,
             )],

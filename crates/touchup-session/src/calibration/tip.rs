@@ -115,9 +115,8 @@ reported! {
 }
 
 impl CalibrationResult for TipFound {
-    fn set_in(&self, scene: &mut Scene) -> (Vec<Setting>, String) {
+    fn settings(&self) -> (Vec<Setting>, String) {
         let offset_mm = self.offset_mm.value.map(|x| rounded(x, 7));
-        scene.tip.get_or_insert_default().offset = Some(Vector3::from(offset_mm) / 1e3);
         let remark = format!(
             "tip: {} poses, residuals {:.3} mm rms",
             self.poses, self.residual_mm
@@ -173,9 +172,8 @@ fn moved(from: Vector3<f64>, by: &VectorEstimate) -> VectorEstimate {
 }
 
 impl CalibrationResult for PivotFound {
-    fn set_in(&self, scene: &mut Scene) -> (Vec<Setting>, String) {
+    fn settings(&self) -> (Vec<Setting>, String) {
         let tip_position_mm = self.tip_position_mm.value.map(|mm| rounded(mm, 7));
-        scene.robot.get_or_insert_default().tip_position = Vector3::from(tip_position_mm) / 1e3;
         let remark = format!(
             "tip: {} touches, residuals {:.4} mm rms",
             self.touches, self.residual_mm

@@ -1,12 +1,16 @@
 //! Edits settings in the text of a scene; comments, order and everything else stay as written.
 //!
 //! Only the lines of edited keys change. The edit verifies its result: the new text must parse to
-//! exactly the expected scene, or the edit fails.
+//! exactly the earlier scene with the settings set, or the edit fails.
 
 mod block;
 mod flow;
 
-use super::{Scene, SceneError};
+use std::path::Path;
+
+use touchup_method::parameters::{Unit, Value};
+
+use super::{Scene, SceneError, yaml_error};
 
 /// One key and its value.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -18,39 +22,61 @@ pub struct Setting {
 }
 
 impl Setting {
+    /// A number.
+    pub fn number(path: &'static str, number: f64) -> Self {
+        // YAML has .inf and .nan
+        let written = number.to_string().to_lowercase();
+        Self::word(path, written.replace("inf", ".inf").replace("nan", ".nan"))
+    }
+
     /// A list of numbers in brackets.
     pub fn list(path: &'static str, values: &[f64]) -> Self {
         let values: Vec<_> = values.iter().map(f64::to_string).collect();
+        Self::word(path, format!("[{}]", values.join(", ")))
+    }
+
+    /// One of the words of its key.
+    pub fn word(path: &'static str, word: impl ToString) -> Self {
         Self {
             path,
-            value: format!("[{}]", values.join(", ")),
+            value: word.to_string(),
         }
     }
 
-    /// A number or a word.
-    pub fn scalar(path: &'static str, value: impl ToString) -> Self {
-        Self {
-            path,
-            value: value.to_string(),
-        }
+    /// The path of a file, in quotes.
+    pub fn file(path: &'static str, file: &Path) -> Self {
+        let file = file.display().to_string().replace('\'', "''");
+        Self::word(path, format!("'{file}'"))
     }
 }
 
 impl Scene {
+    /// Sets keys, unchecked ([`Self::validate`]); a part that is off gets its defaults.
+    ///
+    /// # Errors
+    /// [`SceneError::Yaml`] for an unknown key, or a value of the wrong kind.
+    pub fn set(&mut self, settings: &[Setting]) -> Result<(), SceneError> {
+        for Setting { path, value } in settings {
+            let keys: Vec<&str> = path.split('.').collect();
+            serde_saphyr::with_deserializer_from_str(value, |written| {
+                Value::set(self, &keys, written, Unit::ONE)
+            })
+            .map_err(|error| yaml_error(&error))?;
+        }
+        Ok(())
+    }
+
     /// The text of a scene with `settings` in it.
     ///
     /// - `yaml`: the earlier text; empty for a new scene.
     /// - `remark`: comment after the first edited key, unless the user has one there; one line.
-    /// - `expected`: the scene that the new text must parse to.
     ///
     /// # Errors
-    /// [`SceneError::CannotEdit`] if the result would not be the expected scene.
-    pub fn edited(
-        yaml: &str,
-        settings: &[Setting],
-        remark: &str,
-        expected: &Self,
-    ) -> Result<String, SceneError> {
+    /// Those of [`Self::from_yaml`] and [`Self::set`]; [`SceneError::CannotEdit`] if the new text
+    /// would not be the scene of the earlier one with `settings` set.
+    pub fn edited(yaml: &str, settings: &[Setting], remark: &str) -> Result<String, SceneError> {
+        let mut expected = Self::from_yaml(yaml)?;
+        expected.set(settings)?;
         let listed: Vec<_> = settings
             .iter()
             .map(|Setting { path, value }| format!("{path}: {value}"))
@@ -74,7 +100,7 @@ impl Scene {
             text = new.ok_or_else(|| refused(format!("{path} is written in an unusual form")))?;
         }
         match Self::from_yaml(&text) {
-            Ok(scene) if scene == *expected => Ok(text),
+            Ok(scene) if scene == expected => Ok(text),
             Ok(_) => Err(refused("another section would change".to_owned())),
             Err(error) => Err(refused(error.to_string())),
         }

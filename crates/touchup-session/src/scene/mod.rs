@@ -150,21 +150,19 @@ impl Scene {
             .is_some_and(|value| !value.is_null())
     }
 
-    /// Sets the radius of the ball from a flag, or else checks that the text of the scene gives it.
-    /// The default does not count.
+    /// Checks that the text of the scene gives the radius of the ball. The default does not count.
     ///
     /// - `yaml`: text of the scene; empty for none.
     ///
     /// # Errors
-    /// [`SceneError::NoRadius`] if neither gives it.
-    pub fn tell_radius(&mut self, yaml: &str, radius_mm: Option<f64>) -> Result<(), SceneError> {
-        match radius_mm {
-            Some(radius_mm) => self.tip.get_or_insert_default().ball.radius = radius_mm / 1e3,
-            // a rigid point has none
-            None if self.tip.is_none() || Self::names(yaml, "tip", "radius_mm") => {}
-            None => return Err(SceneError::NoRadius),
+    /// [`SceneError::NoRadius`]
+    pub fn require_radius(&self, yaml: &str) -> Result<(), SceneError> {
+        // a rigid point has none
+        if self.tip.is_none() || Self::names(yaml, "tip", "radius_mm") {
+            Ok(())
+        } else {
+            Err(SceneError::NoRadius)
         }
-        Ok(())
     }
 
     /// The scan that the scene names, and the unit of its coordinates.

@@ -72,8 +72,8 @@ impl BaseScene {
             set(&mut written, key, value).map_err(wrong)?;
         }
         let text = Value::Object(written.clone()).to_string();
-        let scene = Scene::from_yaml(&text)
-            .and_then(|mut scene| scene.tell_radius(&text, None).map(|()| scene));
+        let scene =
+            Scene::from_yaml(&text).and_then(|scene| scene.require_radius(&text).map(|()| scene));
         let scene = scene.map_err(|error| self.blamed(keys, error))?;
         let mut whole = self.usual.clone();
         lay_over(&mut whole, &Value::Object(written));

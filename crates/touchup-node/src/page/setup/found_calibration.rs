@@ -5,7 +5,7 @@ use std::fmt;
 use serde::Serialize;
 
 use touchup_session::calibration::{CalibrationResult, PayloadFound, ScanFound, TipFound};
-use touchup_session::scene::{Scene, Setting};
+use touchup_session::scene::Setting;
 
 /// The result, as `touchup calibrate … --json` prints it.
 #[derive(Clone, Debug, Serialize)]
@@ -27,11 +27,11 @@ impl fmt::Display for FoundCalibration {
 }
 
 impl CalibrationResult for FoundCalibration {
-    fn set_in(&self, scene: &mut Scene) -> (Vec<Setting>, String) {
+    fn settings(&self) -> (Vec<Setting>, String) {
         match self {
-            Self::Tip(found) => found.set_in(scene),
-            Self::Payload(found) => found.set_in(scene),
-            Self::Scan(found) => found.set_in(scene),
+            Self::Tip(found) => found.settings(),
+            Self::Payload(found) => found.settings(),
+            Self::Scan(found) => found.settings(),
         }
     }
 }

@@ -158,35 +158,25 @@ impl SceneDraft {
         tip: Option<StatedTip>,
         scan: Option<(&str, MeshUnit)>,
     ) -> Result<String, SceneError> {
-        let (mut settings, mut expected) = (Vec::new(), self.scene.clone());
+        let mut settings = Vec::new();
         if let Some(StatedTip {
             radius_mm,
             uncertainty_mm,
         }) = tip
         {
-            expected.tip.get_or_insert_default().ball.radius = radius_mm / 1e3;
-            settings.push(Setting::scalar("tip.radius_mm", radius_mm));
-            if let Some(u_mm) = uncertainty_mm {
-                let sigma_mm = u_mm / COVERAGE_FACTOR;
-                expected
-                    .uncertainty
-                    .get_or_insert_default()
-                    .calibration
-                    .radius = sigma_mm / 1e3;
-                settings.push(Setting::scalar("uncertainty.radius_sigma_mm", sigma_mm));
-            }
+            settings.push(Setting::number("tip.radius_mm", radius_mm));
+            settings.extend(uncertainty_mm.map(|u_mm| {
+                Setting::number("uncertainty.radius_sigma_mm", u_mm / COVERAGE_FACTOR)
+            }));
         }
         if let Some((file, unit)) = scan {
-            let part = expected.scan.get_or_insert_default();
-            (part.file, part.unit) = (Some(file.into()), unit);
-            settings.push(Setting::scalar(
-                "scan.file",
-                format!("'{}'", file.replace('\'', "''")),
-            ));
-            settings.push(Setting::scalar("scan.unit", unit));
+            settings.push(Setting::file("scan.file", Path::new(file)));
+            settings.push(Setting::word("scan.unit", unit));
         }
-        expected.validate()?;
-        Scene::edited(&self.text, &settings, REMARK, &expected)
+        let mut scene = self.scene.clone();
+        scene.set(&settings)?;
+        scene.validate()?;
+        Scene::edited(&self.text, &settings, REMARK)
     }
 }
 
