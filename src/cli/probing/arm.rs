@@ -12,11 +12,10 @@ use crate::cli::common::signals::StopSignals;
 use touchup_features::calibrate::ReferenceSphere;
 use touchup_geometry::mesh::TriMesh;
 use touchup_io::mesh_file::MeshUnit;
-use touchup_method::stylus::Payload;
 #[cfg(any(feature = "ros", feature = "r2r"))]
 use touchup_node::ros::arguments::NodeConfig;
 #[cfg(any(feature = "ros", feature = "r2r"))]
-use touchup_node::ros2_control::{ArmTopics, Ros2ControlArm, Ros2ControlParams};
+use touchup_node::ros2_control::{Ros2ControlArm, Ros2ControlParams};
 #[cfg(feature = "ur")]
 use touchup_node::ur::{UrArm, UrParams};
 use touchup_probing::arm::Arm;
@@ -25,7 +24,7 @@ use touchup_session::scan::read_scan;
 #[cfg(feature = "ur")]
 use touchup_session::scene::RobotSection;
 use touchup_session::scene::Scene;
-use touchup_sim::{ArmParams, MeshSurface, SimArm, WEIGHTLESS, WithSpheres};
+use touchup_sim::{ArmParams, MeshSurface, SimArm, WithSpheres};
 
 /// Kind of arm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -134,7 +133,6 @@ pub(in crate::cli) fn ros2_control_arm(
     const NONE: &str = "an arm behind ros2_control needs the sections robot and tip in the scene (docs/ros2_control.md)";
     let of_scene = scene.robot.as_ref().zip(scene.probing());
     let (robot, (cell, params)) = of_scene.ok_or_else(|| CliError::usage(NONE))?;
-    let control = robot.ros2_control.clone().unwrap_or_default();
     let joint_names = match &robot.chain {
         Some(chain) => chain
             .joints()
@@ -147,30 +145,21 @@ pub(in crate::cli) fn ros2_control_arm(
         geometry: cell.geometry,
         joint_names,
         pose_ft: cell.pose_ft,
-        pose_fs: control.pose_fs(),
-        payload: Payload {
-            mass: robot.payload_mass,
-            p_sc: robot.payload_centre,
-            ..WEIGHTLESS
-        },
+        payload: robot.payload(),
         stiffness: params.touch.stiffness,
         latency: params.touch.latency,
         top_joint_speed: params.limits.joint_speed,
-        wrench_frame: control.wrench_frame,
-        topics: ArmTopics {
-            joint_states: control.joint_states_topic,
-            wrench: control.wrench_topic,
-            trajectory: control.trajectory_topic,
-        },
+        section: robot.ros2_control.clone().unwrap_or_default(),
         ..Ros2ControlParams::default()
     };
-    let ArmTopics {
-        joint_states,
-        wrench,
-        trajectory,
-    } = &params.topics;
-    let port = touchup_node::ros::arm_port(config, [joint_states, wrench], trajectory)
-        .map_err(CliError::arm)?;
+    let section = &params.section;
+    let states = [&section.joint_states_topic, &section.wrench_topic];
+    let port = touchup_node::ros::arm_port(
+        config,
+        states.map(String::as_str),
+        &section.trajectory_topic,
+    )
+    .map_err(CliError::arm)?;
     Ok(Box::new(
         Ros2ControlArm::connect(&params, port).map_err(CliError::arm)?,
     ))
@@ -252,25 +241,14 @@ pub(in crate::cli) struct TruePayload {
 impl TruePayload {
     /// Simulated arm with this true payload and the payload of the scene as configured.
     pub fn held_by(&self, arm: ArmParams, scene: &Scene) -> Result<ArmParams, CliError> {
-        let robot = scene.robot.clone().unwrap_or_default();
-        let (mass, centre) = (robot.payload_mass, robot.payload_centre);
-        let configured_payload = Payload {
-            mass,
-            p_sc: centre,
-            ..WEIGHTLESS
-        };
-        let written = |text: &String| millimetres("--truth-payload-centre-mm", text);
-        let p_sc = self
-            .truth_payload_centre_mm
-            .as_ref()
-            .map(written)
-            .transpose()?
-            .unwrap_or(centre);
-        let payload = Payload {
-            mass: self.truth_payload_kg.unwrap_or(mass),
-            p_sc,
-            ..WEIGHTLESS
-        };
+        let configured_payload = scene.robot.clone().unwrap_or_default().payload();
+        let mut payload = configured_payload;
+        if let Some(mass) = self.truth_payload_kg {
+            payload.mass = mass;
+        }
+        if let Some(text) = &self.truth_payload_centre_mm {
+            payload.p_sc = millimetres("--truth-payload-centre-mm", text)?;
+        }
         Ok(ArmParams {
             payload,
             configured_payload,

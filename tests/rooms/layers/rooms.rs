@@ -83,7 +83,7 @@ pub const MAY_USE: &[(&str, &str)] = &[
         "clock stylus mesh reconstruct conformity arm diagnose io inspect input_check calibration scan scene session replay \
          threads ros node",
     ),
-    ("ros2_control", "clock stylus plan arm ros"),
+    ("ros2_control", "clock stylus plan arm scene ros"),
     (
         "cli",
         "clock numeric stylus mesh reconstruct haptic live features conformity plan arm execute sim align \

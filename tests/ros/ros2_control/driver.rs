@@ -287,7 +287,7 @@ fn what_is_told_wrong_of_it_is_refused_by_name() {
             .map(|error| error.to_string())
             .unwrap_or_default()
     };
-    let frame = refused(|params| params.wrench_frame = "tool0".to_owned());
+    let frame = refused(|params| params.section.wrench_frame = "tool0".to_owned());
     assert!(
         frame.contains("\"ft_sensor\"") && frame.contains("robot.wrench_frame"),
         "{frame}"

@@ -9,7 +9,8 @@ use std::time::Duration;
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use touchup::probing::arm::{Arm, ArmError, ArmGeometry, ArmState, Command};
-use touchup::ros2_control::{ArmTopics, Ros2ControlArm, Ros2ControlParams};
+use touchup::ros2_control::{Ros2ControlArm, Ros2ControlParams};
+use touchup::scene::Ros2ControlSection;
 use touchup::sim::{ArmParams, Plate, SimArm, WEIGHTLESS};
 
 use crate::chains::seven_joints;
@@ -40,18 +41,19 @@ fn over(params: &ArmParams, place: [f64; 3]) -> Isometry3<f64> {
 fn told(simulated: &ArmParams, clock: touchup::clock::Clock) -> Ros2ControlParams {
     let joint_count = simulated.geometry.joint_count();
     Ros2ControlParams {
-        topics: ArmTopics {
-            joint_states: "/joint_states".to_owned(),
-            wrench: "/ft_sensor/wrench".to_owned(),
-            trajectory: "/arm_controller/joint_trajectory".to_owned(),
+        section: Ros2ControlSection {
+            joint_states_topic: "/joint_states".to_owned(),
+            wrench_topic: "/ft_sensor/wrench".to_owned(),
+            trajectory_topic: "/arm_controller/joint_trajectory".to_owned(),
+            wrench_frame: "ft_sensor".to_owned(),
+            sensor_position: mounted().translation.vector,
+            sensor_orientation_xyzw: mounted().rotation.coords.into(),
         },
         geometry: simulated.geometry.clone(),
         joint_names: (1..=joint_count)
             .map(|number| format!("joint{number}").into())
             .collect(),
         pose_ft: simulated.pose_ft,
-        wrench_frame: "ft_sensor".to_owned(),
-        pose_fs: mounted(),
         payload: WEIGHTLESS,
         stiffness: simulated.stiffness,
         latency: 20e-3,

@@ -103,7 +103,7 @@ impl Ros2ControlArm {
         if reader.port().order_listeners() == Some(0) {
             let reason = format!(
                 "nobody listens to {}: is joint_trajectory_controller active (`ros2 control list_controllers`)?",
-                params.topics.trajectory
+                params.section.trajectory_topic
             );
             return Err(ArmError::Refused {
                 what: "to connect",
@@ -293,7 +293,7 @@ impl Ros2ControlArm {
         }
         self.way.follow(&self.plan, self.planned_at, now);
         if let Some([ordered, moved]) = self.way.ignored(&self.last.sample.joints, now) {
-            let topic = self.params.topics.trajectory.clone();
+            let topic = self.params.section.trajectory_topic.clone();
             return Err(ArmError::Ignores {
                 topic,
                 ordered_deg: ordered.to_degrees(),
@@ -550,7 +550,7 @@ fn rated(
     let period = apart[RATED / 2];
     if period > LONGEST_PERIOD {
         let (hz, needed) = (1.0 / period, 1.0 / LONGEST_PERIOD);
-        let topic = &params.topics.joint_states;
+        let topic = &params.section.joint_states_topic;
         let reason = format!(
             "{topic} comes with {hz:.0} Hz, and {needed:.0} Hz are needed: raise update_rate of the controller manager"
         );

@@ -15,4 +15,4 @@ mod reader;
 mod topic_age;
 
 pub use arm::Ros2ControlArm;
-pub use params::{ArmTopics, Ros2ControlParams};
+pub use params::Ros2ControlParams;

@@ -8,33 +8,19 @@ use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use touchup_method::stylus::Payload;
 use touchup_probing::arm::{ArmError, ArmGeometry, UrGeometry};
 use touchup_session::clock::Clock;
-
-/// Topics of an arm behind ros2_control.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct ArmTopics {
-    /// `sensor_msgs/JointState` of joint_state_broadcaster
-    pub joint_states: String,
-    /// `geometry_msgs/WrenchStamped` of force_torque_sensor_broadcaster
-    pub wrench: String,
-    /// `trajectory_msgs/JointTrajectory` of joint_trajectory_controller
-    pub trajectory: String,
-}
+use touchup_session::scene::Ros2ControlSection;
 
 /// One arm behind ros2_control, with a probe.
 #[derive(Clone, Debug)]
 pub struct Ros2ControlParams {
-    /// Topics of its messages.
-    pub topics: ArmTopics,
+    /// Topics of its messages, and its sensor.
+    pub section: Ros2ControlSection,
     /// Kinematics from the joints to the flange F.
     pub geometry: ArmGeometry,
     /// Names of the joints from the base to the wrist, as in its joint states.
     pub joint_names: Vec<Arc<str>>,
     /// Pose of the tip (centre of its ball, z from tip to handle) in the flange.
     pub pose_ft: Isometry3<f64>,
-    /// Required frame of the wrenches.
-    pub wrench_frame: String,
-    /// Pose of that frame, S, in the flange.
-    pub pose_fs: Isometry3<f64>,
     /// Everything on the sensor, its centre in the flange, gravity in the base B.
     pub payload: Payload,
     /// Stiffness of arm and probe in series, N/m; bounds the gain of a press.
@@ -62,18 +48,12 @@ impl Default for Ros2ControlParams {
         let upright = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
         let gravity_o = Vector3::new(0.0, 0.0, -9.81);
         Self {
-            topics: ArmTopics {
-                joint_states: "/joint_states".to_owned(),
-                wrench: "/force_torque_sensor_broadcaster/wrench".to_owned(),
-                trajectory: "/joint_trajectory_controller/joint_trajectory".to_owned(),
-            },
+            section: Ros2ControlSection::default(),
             geometry: UrGeometry::UR5E.into(),
             joint_names: (1..=6)
                 .map(|number| format!("joint{number}").into())
                 .collect(),
             pose_ft: Isometry3::from_parts(Vector3::new(0.0, 0.0, 0.15).into(), upright),
-            wrench_frame: "tool0".to_owned(),
-            pose_fs: Isometry3::identity(),
             payload: Payload {
                 mass: 0.25,
                 p_sc: Vector3::new(0.0, 0.0, 0.05),

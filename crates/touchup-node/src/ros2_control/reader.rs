@@ -56,8 +56,8 @@ impl StateReader {
         let now = params.clock.now();
         Self {
             port,
-            joints: TopicAge::new(&params.topics.joint_states, now),
-            wrench: TopicAge::new(&params.topics.wrench, now),
+            joints: TopicAge::new(&params.section.joint_states_topic, now),
+            wrench: TopicAge::new(&params.section.wrench_topic, now),
             waiting: VecDeque::new(),
             wrenches: VecDeque::new(),
             places: VecDeque::new(),
@@ -72,8 +72,8 @@ impl StateReader {
     pub fn restart(&mut self, params: &Ros2ControlParams) {
         while self.port.next_report(Duration::ZERO).is_some() {}
         let now = params.clock.now();
-        self.joints = TopicAge::new(&params.topics.joint_states, now);
-        self.wrench = TopicAge::new(&params.topics.wrench, now);
+        self.joints = TopicAge::new(&params.section.joint_states_topic, now);
+        self.wrench = TopicAge::new(&params.section.wrench_topic, now);
         self.waiting.clear();
         self.wrenches.clear();
         self.places.clear();
@@ -150,7 +150,10 @@ impl StateReader {
                 }
             }
             ArmReport::Unreadable(reason) => {
-                let topic = format!("{} or {}", params.topics.joint_states, params.topics.wrench);
+                let topic = format!(
+                    "{} or {}",
+                    params.section.joint_states_topic, params.section.wrench_topic
+                );
                 return Err(ArmError::Unreadable { topic, reason });
             }
         }
@@ -179,13 +182,13 @@ impl StateReader {
         };
         if apart_ns(stamp_ns) > most_ns {
             let apart_ms = apart_ns(stamp_ns) as f64 * 1e-6;
-            let joints = &params.topics.joint_states;
+            let joints = &params.section.joint_states_topic;
             let reason = format!(
                 "its stamps are {apart_ms:.0} ms from those of {joints}: both have to come from one controller manager, \
                  or from clocks that agree"
             );
             return Err(ArmError::Unreadable {
-                topic: params.topics.wrench.clone(),
+                topic: params.section.wrench_topic.clone(),
                 reason,
             });
         }
@@ -200,7 +203,7 @@ impl StateReader {
         params: &Ros2ControlParams,
     ) -> Result<Option<JointSample>, ArmError> {
         let unreadable = |reason| ArmError::Unreadable {
-            topic: params.topics.joint_states.clone(),
+            topic: params.section.joint_states_topic.clone(),
             reason,
         };
         let place_of = |name: &Arc<str>| message.name.iter().position(|other| **other == **name);
@@ -286,11 +289,11 @@ fn wrench_in_flange(
 ) -> Result<Wrench, ArmError> {
     let unreadable = |reason| {
         Err(ArmError::Unreadable {
-            topic: params.topics.wrench.clone(),
+            topic: params.section.wrench_topic.clone(),
             reason,
         })
     };
-    let (named, wanted) = (&message.header.frame_id, &params.wrench_frame);
+    let (named, wanted) = (&message.header.frame_id, &params.section.wrench_frame);
     if named != wanted {
         return unreadable(format!(
             "it is in the frame {named:?}, and robot.wrench_frame of the scene is {wanted:?}: name that frame there, and its \
@@ -309,7 +312,8 @@ fn wrench_in_flange(
     {
         return unreadable("it has a part that is no number".to_owned());
     }
-    let force = params.pose_fs.rotation * force;
-    let torque = params.pose_fs.rotation * torque + params.pose_fs.translation.vector.cross(&force);
+    let pose_fs = params.section.pose_fs();
+    let force = pose_fs.rotation * force;
+    let torque = pose_fs.rotation * torque + pose_fs.translation.vector.cross(&force);
     Ok(Wrench { force, torque })
 }

@@ -83,20 +83,6 @@ impl UrGeometry {
         radii: [0.095, 0.080, 0.070, 0.060],
     };
 
-    /// Geometry of a model, by its `ur_type` in ROS.
-    pub fn of(name: &str) -> Option<Self> {
-        let models = [
-            ("ur3e", Self::UR3E),
-            ("ur5e", Self::UR5E),
-            ("ur10e", Self::UR10E),
-            ("ur16e", Self::UR16E),
-        ];
-        models
-            .into_iter()
-            .find(|(model, _)| *model == name)
-            .map(|(_, geometry)| geometry)
-    }
-
     /// DH parameters d, a and α of each link, m and rad.
     fn links(&self) -> [(f64, f64, f64); 6] {
         let Self {

@@ -8,16 +8,16 @@ use nalgebra::Isometry3;
 use super::sections::{NO_TURN, unit_quaternion};
 use super::{
     CheckStanding, CompensationSection, GravityAxes, Mode, ModelName, PayloadSection,
-    RefineSection, RobotSection, ScanToSpaceSection, Scene, TipSection,
+    RefineSection, ScanToSpaceSection, Scene, TipSection,
 };
 use touchup_features::diagnose::InputMonitorParams;
 use touchup_method::haptic::{ContactModel, RefineParams, RoiSize, TipParams, relaxing_alpha};
 use touchup_method::reconstruct::{PatchParams, PatcherParams, UncertaintyParams};
 use touchup_method::stylus::{
-    CompensatorParams, MarkerFilter, Payload, Placement, SensorBias, SettingError, SyncParams,
-    TipBody, TipShape, Wrench, WrenchFrame,
+    CompensatorParams, MarkerFilter, Placement, SensorBias, SettingError, SyncParams, TipBody,
+    TipShape, Wrench, WrenchFrame,
 };
-use touchup_probing::arm::{ArmGeometry, TouchParams, UrGeometry};
+use touchup_probing::arm::{ArmGeometry, TouchParams};
 use touchup_probing::execute::{ProbeParams, RobotCell, Tool};
 use touchup_probing::plan::{PatternParams, sigma_of};
 use touchup_sim::ArmParams;
@@ -44,8 +44,8 @@ impl Scene {
         self.robot.as_ref().is_some_and(|robot| robot.allow_motion)
     }
 
-    /// Check of the arm and its doubts, as [`RobotSection::check_standing`]; `None` without
-    /// `robot`.
+    /// Check of the arm and its doubts, as [`super::RobotSection::check_standing`]; `None`
+    /// without `robot`.
     pub fn check_standing(&self, now: SystemTime) -> Option<CheckStanding> {
         let robot = self.robot.as_ref()?;
         Some(robot.check_standing(now))
@@ -53,23 +53,11 @@ impl Scene {
 
     /// The robot cell and its probing parameters; `None` without `robot`.
     pub fn probing(&self) -> Option<(RobotCell, ProbeParams)> {
-        let (
-            robot,
-            TipParams {
-                radius: ball_radius,
-                stiffness,
-            },
-        ) = (self.robot.as_ref()?, self.tip.as_ref()?.ball);
-        let RobotSection {
-            limits,
-            touch,
-            tool,
-            ..
-        } = robot;
+        let (robot, ball) = (self.robot.as_ref()?, self.tip.as_ref()?.ball);
         let cell = RobotCell {
             geometry: match &robot.chain {
                 Some(chain) => ArmGeometry::Chain(chain.clone()),
-                None => UrGeometry::of(robot.model.name())?.into(),
+                None => robot.model.ur()?.into(),
             },
             pose_bo: self
                 .scan_to_space
@@ -77,18 +65,18 @@ impl Scene {
                 .map_or_else(Isometry3::identity, ScanToSpaceSection::pose_wo),
             pose_ft: robot.pose_ft(),
             tool: Tool {
-                ball_radius,
-                ..*tool
+                ball_radius: ball.radius,
+                ..robot.tool
             },
         };
         let touch = TouchParams {
-            acceleration: limits.acceleration,
-            stiffness: stiffness.unwrap_or(touch.stiffness),
-            ..*touch
+            acceleration: robot.limits.acceleration,
+            stiffness: ball.stiffness.unwrap_or(robot.touch.stiffness),
+            ..robot.touch
         };
         let sigma = sigma_of(robot.tolerance, robot.confidence);
         let pattern = PatternParams {
-            ball_radius,
+            ball_radius: ball.radius,
             sigma,
             ..robot.checked_pattern()
         };
@@ -99,7 +87,7 @@ impl Scene {
                 pattern,
                 goals: BTreeMap::new(),
                 slides: false,
-                limits: limits.clone(),
+                limits: robot.limits.clone(),
             },
         ))
     }
@@ -117,32 +105,25 @@ impl Scene {
 
     /// Settings of the compensator for a wrench in the axes of `wrench_frame`.
     pub fn compensator_params(&self, wrench_frame: WrenchFrame) -> CompensatorParams {
-        let Some(CompensationSection {
+        let CompensationSection {
             payload,
             bias,
             mount,
-        }) = &self.compensation
-        else {
-            return CompensatorParams {
-                wrench_frame,
-                ..CompensatorParams::default()
-            };
-        };
+        } = self.compensation.clone().unwrap_or_default();
         let rotation = unit_quaternion(mount.orientation_xyzw.unwrap_or(NO_TURN));
-        let of_space = |payload: &PayloadSection| match (payload.gravity_axes, &self.scan_to_space)
-        {
-            (GravityAxes::Space, Some(space)) => {
-                space.pose_wo().rotation.inverse() * payload.payload.gravity_o
+        let in_scan = |PayloadSection {
+                           gravity_axes,
+                           mut payload,
+                       }| {
+            if let (GravityAxes::Space, Some(space)) = (gravity_axes, &self.scan_to_space) {
+                payload.gravity_o = space.pose_wo().rotation.inverse() * payload.gravity_o;
             }
-            _ => payload.payload.gravity_o,
+            payload
         };
         CompensatorParams {
             wrench_frame,
             pose_ts: Isometry3::from_parts(mount.position.into(), rotation),
-            payload: payload.as_ref().map(|payload| Payload {
-                gravity_o: of_space(payload),
-                ..payload.payload
-            }),
+            payload: payload.map(in_scan),
             bias_s: bias.map(|SensorBias { force, torque }| Wrench { force, torque }),
         }
     }

@@ -15,7 +15,7 @@ use touchup_method::stylus::{
     MarkerBody, MarkerParams, Payload, SensorBias, SensorMount, SettingError, TipShape, TipSizes,
 };
 use touchup_method::words;
-use touchup_probing::arm::{Limits, SerialChain, TouchParams};
+use touchup_probing::arm::{Limits, SerialChain, TouchParams, UrGeometry};
 use touchup_probing::execute::Tool;
 use touchup_probing::plan::{ArmUncertainty, PatternParams};
 
@@ -323,6 +323,19 @@ parameters! {
     }
 }
 
+impl ArmModel {
+    /// Lengths of a UR; `None` for an arm of a URDF.
+    pub(super) fn ur(self) -> Option<UrGeometry> {
+        match self {
+            Self::Ur3e => Some(UrGeometry::UR3E),
+            Self::Ur5e => Some(UrGeometry::UR5E),
+            Self::Ur10e => Some(UrGeometry::UR10E),
+            Self::Ur16e => Some(UrGeometry::UR16E),
+            Self::Urdf => None,
+        }
+    }
+}
+
 impl Ros2ControlSection {
     /// Pose of the sensor in the flange.
     pub fn pose_fs(&self) -> Isometry3<f64> {
@@ -489,6 +502,15 @@ impl RobotSection {
             touch_sigma,
             shared,
             ..self.pattern
+        }
+    }
+
+    /// Everything on the flange, its centre in the flange, gravity in the base.
+    pub fn payload(&self) -> Payload {
+        Payload {
+            mass: self.payload_mass,
+            p_sc: self.payload_centre,
+            ..Payload::default()
         }
     }
 
