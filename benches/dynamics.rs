@@ -7,7 +7,7 @@ use divan::{Bencher, black_box};
 use nalgebra::{Point3, Vector3};
 use rand::{RngExt, SeedableRng};
 use touchup::haptic::{
-    ContactModel, DynamicsParams, FaceDynamics, FaceState, MotionDirection, StepRule,
+    ContactModel, DynamicsParams, FaceDynamics, FaceState, MotionDirection, SigmoidParams, StepRule,
 };
 
 fn main() {
@@ -21,11 +21,11 @@ const SPRING: ContactModel = ContactModel::Spring {
 };
 
 fn sigmoid(h_min_m: f64) -> ContactModel {
-    ContactModel::Sigmoid {
-        f_max_n: 10.0,
-        h_min_m,
+    ContactModel::Sigmoid(SigmoidParams {
+        f_max: 10.0,
+        h_min: h_min_m,
         delta: 5.0,
-    }
+    })
 }
 
 fn dynamics(rule: &str, model: ContactModel, along: MotionDirection) -> FaceDynamics {

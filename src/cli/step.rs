@@ -14,7 +14,8 @@ use nalgebra::{Point3, Vector3};
 use serde::Deserialize;
 
 use touchup_method::haptic::{
-    ContactModel, DynamicsError, DynamicsParams, FaceDynamics, FaceState, MotionDirection, StepRule,
+    ContactModel, DynamicsError, DynamicsParams, FaceDynamics, FaceState, MotionDirection,
+    SigmoidParams, StepRule,
 };
 
 /// Longest line of a sample, bytes.
@@ -127,11 +128,11 @@ fn model_of(question: &StepQuestion) -> Result<ContactModel, StepError> {
     }
     let [h_min_m, delta, f_max_n] =
         sigmoid.map(|(name, value)| value.ok_or(StepError::Missing(name)));
-    Ok(ContactModel::Sigmoid {
-        f_max_n: f_max_n?,
-        h_min_m: h_min_m?,
+    Ok(ContactModel::Sigmoid(SigmoidParams {
+        f_max: f_max_n?,
+        h_min: h_min_m?,
         delta: delta?,
-    })
+    }))
 }
 
 /// 17 significant digits name a double uniquely.

@@ -7,7 +7,8 @@ use std::collections::BTreeSet;
 use nalgebra::vector;
 use proptest::prelude::*;
 use touchup::haptic::{
-    ContactModel, DynamicsParams, MotionDirection, RefineParams, RoiSize, StepRule, TipParams,
+    ContactModel, DynamicsParams, MotionDirection, RefineParams, RoiSize, SigmoidParams, StepRule,
+    TipParams,
 };
 use touchup::io::mesh_file::MeshUnit;
 use touchup::io::recording::TableColumns;
@@ -442,11 +443,11 @@ refine: { mode: paper, contact_model: spring, alpha_m_per_n_s: 0.5, beta_per_n2_
         .unwrap();
     assert_eq!(
         params.dynamics.model,
-        ContactModel::Sigmoid {
-            f_max_n: 20.0,
-            h_min_m: 0.002,
+        ContactModel::Sigmoid(SigmoidParams {
+            f_max: 20.0,
+            h_min: 0.002,
             delta: 3.0
-        }
+        })
     );
     assert!(params.dynamics.take_out_rigid_offset);
 }

@@ -13,7 +13,9 @@
 use std::sync::LazyLock;
 
 use nalgebra::{DMatrix, DVector, Matrix2, Point3, Vector3};
-use touchup_method::haptic::{ContactModel, DynamicsParams, FaceState, MotionDirection};
+use touchup_method::haptic::{
+    ContactModel, DynamicsParams, FaceState, MotionDirection, SigmoidParams,
+};
 
 use super::double_double::Double2;
 
@@ -180,12 +182,12 @@ impl<'a> ForcePlane<'a> {
             ContactModel::Spring { stiffness_n_per_m } => {
                 (-h * stiffness_n_per_m.into(), -stiffness_n_per_m)
             }
-            ContactModel::Sigmoid {
-                f_max_n,
-                h_min_m,
+            ContactModel::Sigmoid(SigmoidParams {
+                f_max,
+                h_min,
                 delta,
-            } => {
-                let u = h / h_min_m.into() + delta.into();
+            }) => {
+                let u = h / h_min.into() + delta.into();
                 let size = if u.high > 0.0 { u } else { -u };
                 let e = if size.high > LARGEST_EXPONENT {
                     Double2::from(0.0)
@@ -198,7 +200,7 @@ impl<'a> ForcePlane<'a> {
                     one / (one + e)
                 };
                 let slope = (e / ((one + e) * (one + e))).value();
-                (share * f_max_n.into(), -f_max_n / h_min_m * slope)
+                (share * f_max.into(), -f_max / h_min * slope)
             }
         }
     }
@@ -239,7 +241,7 @@ impl<'a> ForcePlane<'a> {
         // first step short against every time constant
         let (rate, jacobian) = self.rate(&y);
         let length = match self.held.params.model {
-            ContactModel::Sigmoid { h_min_m, .. } => h_min_m,
+            ContactModel::Sigmoid(curve) => curve.h_min,
             ContactModel::Spring { stiffness_n_per_m } => {
                 self.held.arm.norm() + self.held.force.norm() / stiffness_n_per_m
             }

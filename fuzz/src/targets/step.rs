@@ -5,7 +5,7 @@ use crate::{number, vector};
 use arbitrary::{Result, Unstructured};
 use nalgebra::{Point3, Vector3};
 use touchup_method::haptic::{
-    ContactModel, DynamicsParams, FaceDynamics, FaceState, MotionDirection, StepRule,
+    ContactModel, DynamicsParams, FaceDynamics, FaceState, MotionDirection, SigmoidParams, StepRule,
 };
 
 fn step(bytes: &mut Unstructured) -> Result<()> {
@@ -19,11 +19,11 @@ fn step(bytes: &mut Unstructured) -> Result<()> {
             number(bytes, 1e-3)?,
             number(bytes, 10.0)?,
         );
-        ContactModel::Sigmoid {
-            f_max_n,
-            h_min_m,
+        ContactModel::Sigmoid(SigmoidParams {
+            f_max: f_max_n,
+            h_min: h_min_m,
             delta,
-        }
+        })
     };
     let rules = [
         StepRule::Lie,

@@ -6,7 +6,8 @@ use std::f64::consts::PI;
 use nalgebra::{Point3, Rotation3, Vector3};
 use proptest::prelude::*;
 use touchup::haptic::{
-    ContactModel, DynamicsError, DynamicsParams, FaceDynamics, FaceState, MotionDirection, StepRule,
+    ContactModel, DynamicsError, DynamicsParams, FaceDynamics, FaceState, MotionDirection,
+    SigmoidParams, StepRule,
 };
 use touchup::sim::coupled::GuidedStylus;
 
@@ -14,11 +15,11 @@ use super::counted::{Shown, tried};
 
 const H_MIN: f64 = 0.5e-3;
 const F_MAX: f64 = 10.0;
-const SIGMOID: ContactModel = ContactModel::Sigmoid {
-    f_max_n: F_MAX,
-    h_min_m: H_MIN,
+const SIGMOID: ContactModel = ContactModel::Sigmoid(SigmoidParams {
+    f_max: F_MAX,
+    h_min: H_MIN,
     delta: 5.0,
-};
+});
 const UP: FaceState = FaceState {
     b: Point3::new(0.0, 0.0, 0.0),
     n: Vector3::new(0.0, 0.0, 1.0),
@@ -343,11 +344,11 @@ fn lie_is_first_order_and_corrected_second() {
 
 #[test]
 fn the_corrected_step_stays_accurate_when_stiff() {
-    let model = ContactModel::Sigmoid {
-        f_max_n: F_MAX,
-        h_min_m: 1e-6,
+    let model = ContactModel::Sigmoid(SigmoidParams {
+        f_max: F_MAX,
+        h_min: 1e-6,
         delta: 5.0,
-    };
+    });
     let params = |rule| DynamicsParams {
         model,
         rule,
@@ -507,11 +508,11 @@ fn check_extremes(
             stiffness_n_per_m: h_min_m,
         }
     } else {
-        ContactModel::Sigmoid {
-            f_max_n,
-            h_min_m,
+        ContactModel::Sigmoid(SigmoidParams {
+            f_max: f_max_n,
+            h_min: h_min_m,
             delta,
-        }
+        })
     };
     let params = DynamicsParams {
         model,
@@ -676,11 +677,11 @@ fn shares() -> impl Strategy<Value = f64> {
 /// rates of its ends, f by f_max e^(−u/2) / (2 cosh(u/2)), as h moves monotonically and f falls
 /// with h.
 fn check_sum(u: f64, c: f64, t: f64, first: f64, tilted: bool) -> Shown {
-    let model = ContactModel::Sigmoid {
-        f_max_n: 1.0,
-        h_min_m: 1.0,
+    let model = ContactModel::Sigmoid(SigmoidParams {
+        f_max: 1.0,
+        h_min: 1.0,
         delta: 0.0,
-    };
+    });
     let along = if tilted {
         MotionDirection::Force
     } else {

@@ -8,7 +8,7 @@ use proptest::prelude::*;
 use touchup::haptic::dynamics::turn;
 use touchup::haptic::{
     ContactModel, DynamicsParams, FaceDynamics, FaceState, MotionDirection, RefineParams, Refiner,
-    StepRule, TipParams,
+    SigmoidParams, StepRule, TipParams,
 };
 use touchup::mesh::{TriMesh, VertexId};
 use touchup::stylus::{Sample, Wrench};
@@ -59,11 +59,11 @@ fn dynamics(model: ContactModel, alpha: f64, beta: f64) -> FaceDynamics {
 }
 
 fn sigmoid(f_max_n: f64, h_min_m: f64, delta: f64) -> ContactModel {
-    ContactModel::Sigmoid {
-        f_max_n,
-        h_min_m,
+    ContactModel::Sigmoid(SigmoidParams {
+        f_max: f_max_n,
+        h_min: h_min_m,
         delta,
-    }
+    })
 }
 
 /// Eq 3 is f_max e^(−u/2) / (2 cosh(u/2)): nothing cancels.

@@ -133,11 +133,9 @@ pub fn relaxing_alpha(model: &ContactModel) -> f64 {
     let slope = match *model {
         ContactModel::Spring { stiffness_n_per_m } => stiffness_n_per_m,
         // f (1 − f/f_max) / h_min; at more than half of f_max the slope falls again
-        ContactModel::Sigmoid {
-            f_max_n, h_min_m, ..
-        } => {
-            let share = (USUAL_FORCE / f_max_n).min(0.5);
-            f_max_n * share * (1.0 - share) / h_min_m
+        ContactModel::Sigmoid(curve) => {
+            let share = (USUAL_FORCE / curve.f_max).min(0.5);
+            curve.f_max * share * (1.0 - share) / curve.h_min
         }
     };
     RELAXATION / slope

@@ -8,7 +8,8 @@ use super::face_runs::log_uniform;
 use crate::reference::{HeldFace, Reference};
 use touchup_method::haptic::dynamics::RELATIVE_ERROR;
 use touchup_method::haptic::{
-    ContactModel, DynamicsError, DynamicsParams, FaceDynamics, FaceState, MotionDirection, StepRule,
+    ContactModel, DynamicsError, DynamicsParams, FaceDynamics, FaceState, MotionDirection,
+    SigmoidParams, StepRule,
 };
 
 /// Roundings of |F| and of the tip's distance, beyond the step's control.
@@ -120,11 +121,11 @@ fn draw(rng: &mut Pcg64, is_spring: bool, along: MotionDirection) -> HeldFace {
             stiffness_n_per_m: f_max / h_min,
         }
     } else {
-        ContactModel::Sigmoid {
-            f_max_n: f_max,
-            h_min_m: h_min,
+        ContactModel::Sigmoid(SigmoidParams {
+            f_max,
+            h_min,
             delta: 5.0,
-        }
+        })
     };
     // a pulling spring turns the face away from the force without end: milder
     let turning = if is_spring { -3.0..2.0 } else { -3.0..6.0 };
@@ -206,7 +207,7 @@ fn errors_beside_roundings(held: &HeldFace, face: &FaceState, reference: &Refere
 /// Width of a sigmoid, m, whose shift shares a sum with the distance.
 fn length_scale(model: &ContactModel) -> f64 {
     match *model {
-        ContactModel::Sigmoid { h_min_m, .. } => h_min_m,
+        ContactModel::Sigmoid(curve) => curve.h_min,
         ContactModel::Spring { .. } => 0.0,
     }
 }

@@ -5,7 +5,7 @@ use rand::RngExt;
 use rand_pcg::Pcg64;
 
 use super::integrators::{HeldSample, Integrator};
-use touchup_method::haptic::{ContactModel, DynamicsParams};
+use touchup_method::haptic::{ContactModel, DynamicsParams, SigmoidParams};
 use touchup_method::names;
 
 /// Samples held in each run.
@@ -79,11 +79,11 @@ impl FaceRun {
                 stiffness_n_per_m: f_max / h_min,
             }
         } else {
-            ContactModel::Sigmoid {
-                f_max_n: f_max,
-                h_min_m: h_min,
+            ContactModel::Sigmoid(SigmoidParams {
+                f_max,
+                h_min,
                 delta: 5.0,
-            }
+            })
         };
         let beta = log_uniform(rng, BETA);
         let params = DynamicsParams {

@@ -125,10 +125,10 @@ fn rate(params: &DynamicsParams, held: &HeldSample, y: &StateVector) -> StateVec
     let h = (held.arm - towards * y[0]).dot(&n);
     let force_along_n = held.force.dot(&n);
     let (force_along_n, h) = match params.model {
-        ContactModel::Sigmoid { f_max_n, .. } if params.take_out_rigid_offset => {
+        ContactModel::Sigmoid(curve) if params.take_out_rigid_offset => {
             let lowest = params.model.force(0.0);
             (
-                force_along_n.max(lowest).min(LARGEST_SHARE * f_max_n),
+                force_along_n.max(lowest).min(LARGEST_SHARE * curve.f_max),
                 h + params.model.rigid_offset(force_along_n),
             )
         }
@@ -148,7 +148,7 @@ fn rate(params: &DynamicsParams, held: &HeldSample, y: &StateVector) -> StateVec
 /// Characteristic length, m.
 fn scale(params: &DynamicsParams, held: &HeldSample) -> f64 {
     let of_model = match params.model {
-        ContactModel::Sigmoid { h_min_m, .. } => h_min_m,
+        ContactModel::Sigmoid(curve) => curve.h_min,
         ContactModel::Spring { stiffness_n_per_m } => held.force.norm() / stiffness_n_per_m,
     };
     held.arm.norm() + of_model

@@ -8,7 +8,7 @@ use rand_pcg::Pcg64;
 use super::face_runs::log_uniform;
 use crate::double_double::Double2;
 use touchup_method::haptic::{
-    ContactModel, DynamicsParams, FaceDynamics, FaceState, MotionDirection,
+    ContactModel, DynamicsParams, FaceDynamics, FaceState, MotionDirection, SigmoidParams,
 };
 
 /// Halvings of the bracket: from 1e9 to below a rounding of the residual.
@@ -20,11 +20,11 @@ const LARGEST_EXPONENT: f64 = 690.0;
 const NEAREST_OPPOSITE: std::ops::Range<f64> = -5.0..-1.0;
 /// Model without input roundings: lengths in units of h_min, forces of f_max, times of h_min/(α
 /// f_max).
-const UNIT_MODEL: ContactModel = ContactModel::Sigmoid {
-    f_max_n: 1.0,
-    h_min_m: 1.0,
+const UNIT_MODEL: ContactModel = ContactModel::Sigmoid(SigmoidParams {
+    f_max: 1.0,
+    h_min: 1.0,
     delta: 0.0,
-};
+});
 
 /// Largest error of one sub-flow.
 #[derive(Clone, Debug, PartialEq)]

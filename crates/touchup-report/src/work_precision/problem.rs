@@ -8,7 +8,9 @@
 use nalgebra::{Matrix3, Matrix4, Point3, Vector3, Vector4};
 
 use crate::reference::HeldFace;
-use touchup_method::haptic::{ContactModel, DynamicsParams, FaceState, MotionDirection, StepRule};
+use touchup_method::haptic::{
+    ContactModel, DynamicsParams, FaceState, MotionDirection, SigmoidParams, StepRule,
+};
 
 /// Travel along n*(0), m, and the normal.
 pub type State = [f64; 4];
@@ -63,11 +65,11 @@ impl Problem {
     /// Parameters of [`touchup_method::haptic::FaceDynamics`], with the paper's direction of motion.
     pub fn params(&self, rule: StepRule) -> DynamicsParams {
         DynamicsParams {
-            model: ContactModel::Sigmoid {
-                f_max_n: F_MAX_N,
-                h_min_m: self.h_min_m,
+            model: ContactModel::Sigmoid(SigmoidParams {
+                f_max: F_MAX_N,
+                h_min: self.h_min_m,
                 delta: DELTA,
-            },
+            }),
             alpha_m_per_n_s: ALPHA_M_PER_N_S,
             beta_per_n2_s: BETA_PER_N2_S,
             rule,

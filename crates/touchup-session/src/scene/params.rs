@@ -237,12 +237,12 @@ impl RefineSection {
             (Some(ModelName::Spring), _, Some(stiffness_n_per_m)) => {
                 ContactModel::Spring { stiffness_n_per_m }
             }
-            (Some(ModelName::Sigmoid), ..) | (None, ContactModel::Sigmoid { .. }, _) => {
-                self.sigmoid.model()
+            (Some(ModelName::Sigmoid), ..) | (None, ContactModel::Sigmoid(_), _) => {
+                ContactModel::Sigmoid(self.sigmoid)
             }
             (_, as_is, _) => as_is,
         };
-        let is_sigmoid = matches!(dynamics.model, ContactModel::Sigmoid { .. });
+        let is_sigmoid = matches!(dynamics.model, ContactModel::Sigmoid(_));
         dynamics.take_out_rigid_offset = is_sigmoid && self.mode == Mode::Robust;
         let alpha = match self.mode {
             Mode::Paper => dynamics.alpha_m_per_n_s,

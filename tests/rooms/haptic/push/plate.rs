@@ -153,9 +153,7 @@ fn force_beyond_the_model_does_not_run_away() {
         ..BALL
     };
     let params = RefineParams::robust(tip);
-    assert!(
-        matches!(params.dynamics.model, ContactModel::Sigmoid { f_max_n, .. } if f_max_n == 10.0)
-    );
+    assert!(matches!(params.dynamics.model, ContactModel::Sigmoid(curve) if curve.f_max == 10.0));
     for force in [9.95, 10.0, 12.0, 1e3, 9e4] {
         let mut refiner = Refiner::new(grid(15, EDGE, |_, _| 0.0), params).unwrap();
         for tick in 0..5_000 {

@@ -4,6 +4,7 @@
 
 use super::error::DynamicsError;
 use super::sigmoid_flow::{advance, share};
+use crate::parameters;
 
 /// Share of f_max up to which a sigmoid is reliable: beyond it the depth runs off to infinity, and
 /// with it the offset.
@@ -53,18 +54,28 @@ pub(super) struct Shift {
     pub impulse: f64,
 }
 
+parameters! {
+    /// The sigmoid of Eq 3.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct SigmoidParams in "refine" {
+        /// Largest force of the sigmoid.
+        ///
+        /// In N. The paper leaves it open.
+        f_max: f64 = 10.0, "f_max_n" [N, 1e-6, 1e6];
+        /// Width of the sigmoid.
+        ///
+        /// In m.
+        h_min: f64 = 0.5, "h_min_mm" [MM, 1e-9, 1e6];
+        /// Shift of the sigmoid.
+        delta: f64 = 5.0, "delta" [ONE, -50, 50];
+    }
+}
+
 /// Expected force f over the signed distance h of the tip from the face (positive outside).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ContactModel {
     /// f(h) = f_max / (1 + exp(h/h_min + δ)) \[paper, Eq 3\].
-    Sigmoid {
-        /// f_max, N, > 0
-        f_max_n: f64,
-        /// h_min, m, > 0
-        h_min_m: f64,
-        /// δ; the force at h = 0 is f_max / (1 + e^δ)
-        delta: f64,
-    },
+    Sigmoid(SigmoidParams),
     /// f(h) = −k h on both sides of h = 0: a probe of known stiffness.
     Spring {
         /// k, N/m, > 0
@@ -78,14 +89,10 @@ impl ContactModel {
     pub(crate) fn check(&self) -> Result<(), DynamicsError> {
         let positive = |name, value| DynamicsError::check(name, value, value > 0.0);
         match *self {
-            Self::Sigmoid {
-                f_max_n,
-                h_min_m,
-                delta,
-            } => {
-                positive("f_max_n", f_max_n)?;
-                positive("h_min_m", h_min_m)?;
-                DynamicsError::check("delta", delta, true)
+            Self::Sigmoid(curve) => {
+                positive("f_max_n", curve.f_max)?;
+                positive("h_min_m", curve.h_min)?;
+                DynamicsError::check("delta", curve.delta, true)
             }
             Self::Spring { stiffness_n_per_m } => positive("k_n_per_m", stiffness_n_per_m),
         }
@@ -94,11 +101,7 @@ impl ContactModel {
     /// f(h), N.
     pub fn force(&self, h_m: f64) -> f64 {
         match *self {
-            Self::Sigmoid {
-                f_max_n,
-                h_min_m,
-                delta,
-            } => f_max_n * share(h_m / h_min_m + delta),
+            Self::Sigmoid(curve) => curve.f_max * share(h_m / curve.h_min + curve.delta),
             Self::Spring { stiffness_n_per_m } => -stiffness_n_per_m * h_m,
         }
     }
@@ -106,13 +109,9 @@ impl ContactModel {
     /// df/dh, N/m, ≤ 0.
     pub(super) fn slope(&self, h_m: f64) -> f64 {
         match *self {
-            Self::Sigmoid {
-                f_max_n,
-                h_min_m,
-                delta,
-            } => {
-                let u = h_m / h_min_m + delta;
-                -f_max_n / h_min_m * share(u) * share(-u)
+            Self::Sigmoid(curve) => {
+                let u = h_m / curve.h_min + curve.delta;
+                -curve.f_max / curve.h_min * share(u) * share(-u)
             }
             Self::Spring { stiffness_n_per_m } => -stiffness_n_per_m,
         }
@@ -121,21 +120,18 @@ impl ContactModel {
     /// f⁻¹(F), m; infinite if the sigmoid never reaches F.
     pub fn distance(&self, force_n: f64) -> f64 {
         match *self {
-            Self::Sigmoid { f_max_n, .. } if force_n <= 0.0 => f_max_n * f64::INFINITY,
-            Self::Sigmoid { f_max_n, .. } if force_n >= f_max_n => f64::NEG_INFINITY,
-            Self::Sigmoid {
-                f_max_n,
-                h_min_m,
-                delta,
-            } => {
-                let (rest, quotient) = (f_max_n - force_n, (f_max_n - force_n) / force_n);
+            Self::Sigmoid(curve) if force_n <= 0.0 => curve.f_max * f64::INFINITY,
+            Self::Sigmoid(curve) if force_n >= curve.f_max => f64::NEG_INFINITY,
+            Self::Sigmoid(curve) => {
+                let rest = curve.f_max - force_n;
+                let quotient = rest / force_n;
                 // the sigmoid still reaches a force so small that the quotient overflows
                 let log = if quotient.is_finite() {
                     quotient.ln()
                 } else {
                     rest.ln() - force_n.ln()
                 };
-                h_min_m * (log - delta)
+                curve.h_min * (log - curve.delta)
             }
             Self::Spring { stiffness_n_per_m } => -force_n / stiffness_n_per_m,
         }
@@ -144,10 +140,8 @@ impl ContactModel {
     /// Derivative of [`Self::distance`], m/N; zero if the distance is infinite.
     pub(super) fn distance_slope(&self, force_n: f64) -> f64 {
         match *self {
-            Self::Sigmoid { f_max_n, .. } if force_n <= 0.0 || force_n >= f_max_n => 0.0,
-            Self::Sigmoid {
-                f_max_n, h_min_m, ..
-            } => -h_min_m * (1.0 / (f_max_n - force_n) + 1.0 / force_n),
+            Self::Sigmoid(curve) if force_n <= 0.0 || force_n >= curve.f_max => 0.0,
+            Self::Sigmoid(curve) => -curve.h_min * (1.0 / (curve.f_max - force_n) + 1.0 / force_n),
             Self::Spring { stiffness_n_per_m } => -1.0 / stiffness_n_per_m,
         }
     }
@@ -155,14 +149,14 @@ impl ContactModel {
     /// Whether F·n exceeds the model: [`Self::rigid_offset`], and a step that takes the offset out,
     /// then use [`LARGEST_SHARE`] · f_max instead; any other step lets the face escape.
     pub fn clamps(&self, force_n: f64) -> bool {
-        matches!(*self, Self::Sigmoid { f_max_n, .. } if force_n > LARGEST_SHARE * f_max_n)
+        matches!(*self, Self::Sigmoid(curve) if force_n > LARGEST_SHARE * curve.f_max)
     }
 
     /// Force for comparison with a rigid contact: F·n between f(0), below which the model cannot
     /// distinguish contact from none, and [`LARGEST_SHARE`] · f_max.
     pub(super) fn comparable(&self, force_n: f64, at_zero_n: f64) -> f64 {
         match *self {
-            Self::Sigmoid { f_max_n, .. } => force_n.max(at_zero_n).min(LARGEST_SHARE * f_max_n),
+            Self::Sigmoid(curve) => force_n.max(at_zero_n).min(LARGEST_SHARE * curve.f_max),
             Self::Spring { .. } => force_n,
         }
     }
@@ -179,11 +173,7 @@ impl ContactModel {
     #[inline]
     pub(super) fn flow(&self, hold: &Hold) -> Shift {
         match *self {
-            Self::Sigmoid {
-                f_max_n,
-                h_min_m,
-                delta,
-            } => sigmoid(hold, f_max_n, h_min_m, delta),
+            Self::Sigmoid(curve) => sigmoid(hold, curve.f_max, curve.h_min, curve.delta),
             Self::Spring { stiffness_n_per_m } => spring(hold, stiffness_n_per_m),
         }
     }

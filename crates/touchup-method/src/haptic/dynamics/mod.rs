@@ -25,10 +25,10 @@ mod sigmoid_flow;
 
 use nalgebra::{Matrix2, Point3, Vector2, Vector3};
 
-use crate::{parameters, words};
+use crate::words;
 use touchup_geometry::numeric::length_and_direction;
 
-pub use contact_model::{ContactModel, LARGEST_SHARE};
+pub use contact_model::{ContactModel, LARGEST_SHARE, SigmoidParams};
 use contact_model::{Hold, Shift};
 pub use error::DynamicsError;
 pub use rotation::turn;
@@ -83,34 +83,6 @@ words! {
     }
 }
 
-parameters! {
-    /// The sigmoid of Eq 3.
-    #[derive(Clone, Copy, Debug, PartialEq)]
-    pub struct SigmoidParams in "refine" {
-        /// Largest force of the sigmoid.
-        ///
-        /// In N. The paper leaves it open.
-        f_max: f64 = 10.0, "f_max_n" [N, 1e-6, 1e6];
-        /// Width of the sigmoid.
-        ///
-        /// In m.
-        h_min: f64 = 0.5, "h_min_mm" [MM, 1e-9, 1e6];
-        /// Shift of the sigmoid.
-        delta: f64 = 5.0, "delta" [ONE, -50, 50];
-    }
-}
-
-impl SigmoidParams {
-    /// Expected force of the sigmoid.
-    pub fn model(&self) -> ContactModel {
-        ContactModel::Sigmoid {
-            f_max_n: self.f_max,
-            h_min_m: self.h_min,
-            delta: self.delta,
-        }
-    }
-}
-
 /// Parameters of [`FaceDynamics`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DynamicsParams {
@@ -135,7 +107,7 @@ impl Default for DynamicsParams {
     /// choice for the rest.
     fn default() -> Self {
         Self {
-            model: SigmoidParams::default().model(),
+            model: ContactModel::Sigmoid(SigmoidParams::default()),
             alpha_m_per_n_s: 0.1,
             beta_per_n2_s: 0.1,
             rule: StepRule::Lie,
@@ -370,7 +342,7 @@ impl FaceDynamics {
         }
         let (model, alpha) = (&self.params.model, self.params.alpha_m_per_n_s);
         let (contact, shift) = match *model {
-            ContactModel::Sigmoid { h_min_m, delta, .. } => (h_min_m, (h_min_m * delta).abs()),
+            ContactModel::Sigmoid(curve) => (curve.h_min, (curve.h_min * curve.delta).abs()),
             ContactModel::Spring { stiffness_n_per_m } => (
                 self.hold(touch).h.abs() + touch.magnitude / stiffness_n_per_m,
                 0.0,
@@ -430,7 +402,7 @@ impl FaceDynamics {
             [alpha * (force - expected), turning.x, turning.y, turning.z]
         };
         let scale = match *model {
-            ContactModel::Sigmoid { h_min_m, .. } => h_min_m,
+            ContactModel::Sigmoid(curve) => curve.h_min,
             ContactModel::Spring { stiffness_n_per_m } => {
                 self.hold(touch).h.abs() + touch.magnitude / stiffness_n_per_m
             }
