@@ -4,7 +4,7 @@ use std::path::Path;
 use std::time::SystemTime;
 
 use chrono::{DateTime, Utc};
-use touchup_geometry::numeric::counted;
+use touchup_geometry::numeric::{counted, median};
 
 use super::InspectionError;
 use super::source::InspectionSource;
@@ -58,8 +58,7 @@ fn of_touches(touches: &[ProbedPoint]) -> Vec<CalibrationLine> {
     }
     let median_mm = |number: fn(&ProbedPoint) -> f64| {
         let mut all: Vec<f64> = touches.iter().map(number).collect();
-        all.sort_by(f64::total_cmp);
-        all[all.len() / 2] * 1e3
+        median(&mut all).unwrap_or_default() * 1e3
     };
     // 0: the file does not state it
     let mm = |number: f64| {

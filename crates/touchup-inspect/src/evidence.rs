@@ -2,9 +2,10 @@
 
 use std::f64::consts::PI;
 
-use nalgebra::{Matrix3, Point3, Vector3};
+use nalgebra::{Point3, Vector3};
 
 use touchup_features::features::InspectedQuantity;
+use touchup_geometry::numeric::NormalEquations;
 use touchup_io::features_file::FeatureRecord;
 use touchup_io::probed_touches_file::TouchLine;
 use touchup_method::stylus::ProbedPoint;
@@ -148,16 +149,11 @@ fn off_two_planes(seats: &[Vector3<f64>], axis: &Vector3<f64>, level: f64) -> Ve
     let is_far = |seat: &Vector3<f64>| seat.dot(axis).abs() > (seat.dot(axis) - level).abs();
     let row = |seat: &Vector3<f64>| Vector3::new(1.0, seat.dot(&u), seat.dot(&v));
     let plane = |far: bool| {
-        let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
-        for seat in seats.iter().filter(|seat| is_far(seat) == far) {
-            normal += row(seat) * row(seat).transpose();
-            right += row(seat) * seat.dot(axis);
-        }
+        let of_end = seats.iter().filter(|seat| is_far(seat) == far);
+        let sums = NormalEquations::of(of_end.map(|seat| (row(seat), seat.dot(axis))));
         // fewer than three points, or collinear ones, have their mean height
-        let mean = Vector3::new(right.x / normal.m11.max(1.0), 0.0, 0.0);
-        normal
-            .cholesky()
-            .map_or(mean, |factor| factor.solve(&right))
+        let mean = Vector3::new(sums.right.x / sums.information.m11.max(1.0), 0.0, 0.0);
+        sums.solution().unwrap_or(mean)
     };
     let planes = [plane(false), plane(true)];
     seats

@@ -11,6 +11,7 @@ use super::segmentation::primitive::{FACES_ALIKE, Primitive};
 use super::segmentation::segment::Segment;
 use super::walls::Wall;
 use touchup_geometry::mesh::FaceId;
+use touchup_geometry::numeric::thinnest_direction;
 
 /// Minimum share of a turn of a shaft: less is the rounding of an edge, which looks wider in a
 /// measured mesh.
@@ -136,16 +137,7 @@ fn plane_through<'a>(
     let scatter: Matrix3<f64> = points
         .map(|(p, weight)| (p.coords - mean) * (p.coords - mean).transpose() * *weight)
         .sum();
-    (all > 0.0).then(|| {
-        let eigen = scatter.symmetric_eigen();
-        Plane::new(
-            mean.into(),
-            &eigen
-                .eigenvectors
-                .column(eigen.eigenvalues.imin())
-                .into_owned(),
-        )
-    })
+    (all > 0.0).then(|| Plane::new(mean.into(), &thinnest_direction(scatter)))
 }
 
 #[cfg(test)]

@@ -2,12 +2,12 @@
 
 use std::ops::Range;
 
-use nalgebra::{Matrix2, Point3, SVector, SymmetricEigen, Vector2, Vector3};
+use nalgebra::{Point3, SVector, SymmetricEigen, Vector2, Vector3};
 
 use super::profile::{DesignRow, FormPoint, Profile};
 use super::round_form::Deviation;
 use super::zone::linear_zone;
-use crate::numeric::tangent_basis;
+use crate::numeric::{scatter, tangent_basis};
 
 /// Form of the touched part of a flat wall.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -135,9 +135,7 @@ fn long_sides(
     let local = points
         .iter()
         .map(|p| Vector2::new(u.dot(&(p.point - on_plane)), v.dot(&(p.point - on_plane))));
-    let count = points.len().max(1) as f64;
-    let middle = local.clone().sum::<Vector2<f64>>() / count;
-    let scatter: Matrix2<f64> = local.map(|q| (q - middle) * (q - middle).transpose()).sum();
+    let scatter = scatter(local);
     if !scatter.iter().all(|x| x.is_finite()) {
         return None;
     }

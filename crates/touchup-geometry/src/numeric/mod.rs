@@ -21,7 +21,7 @@ pub use counted::counted;
 pub use direction::{direction, length_and_direction};
 pub use jackknife::jackknife_variance;
 pub use least_squares::{DampedSearch, NormalEquations, SearchEnd};
-pub use moments::{centroid_and_spread, mean, scatter, spreads};
+pub use moments::{centroid_and_spread, mean, scatter, spreads, thinnest_direction};
 pub use normal::{circle_probability, normal_cdf, normal_quantile};
 pub use point_grid::PointGrid;
 pub use quantile::{largest, median, order_statistic, quantile, weighted_quantile};

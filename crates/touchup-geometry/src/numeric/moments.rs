@@ -2,7 +2,7 @@
 
 use std::ops::{Add, Div};
 
-use nalgebra::{Matrix3, Point3, Vector3};
+use nalgebra::{Matrix3, Point3, SMatrix, SVector, Vector3};
 
 /// Mean of some numbers or vectors; 0 without any.
 pub fn mean<T>(values: impl Iterator<Item = T>) -> T
@@ -17,9 +17,22 @@ where
 
 /// Scatter of some vectors about their mean m, Σ (v − m)(v − m)ᵀ: symmetric, positive
 /// semi-definite.
-pub fn scatter(vectors: impl Iterator<Item = Vector3<f64>> + Clone) -> Matrix3<f64> {
+pub fn scatter<const D: usize>(
+    vectors: impl Iterator<Item = SVector<f64, D>> + Clone,
+) -> SMatrix<f64, D, D>
+where
+    SVector<f64, D>: Default,
+{
     let mean = mean(vectors.clone());
     vectors.map(|v| (v - mean) * (v - mean).transpose()).sum()
+}
+
+/// Unit eigenvector of the least eigenvalue of a symmetric matrix: the normal of the plane of least
+/// squares through points with this scatter.
+pub fn thinnest_direction(scatter: Matrix3<f64>) -> Vector3<f64> {
+    let eigen = scatter.symmetric_eigen();
+    let least = eigen.eigenvalues.imin();
+    eigen.eigenvectors.column(least).into_owned()
 }
 
 /// Root mean square distances of some vectors from their mean along their principal axes, in rising
@@ -69,6 +82,7 @@ mod tests {
             scatter,
             Matrix3::from_diagonal(&Vector3::new(4.0, 4.0, 0.0))
         );
+        assert_eq!(thinnest_direction(scatter).map(f64::abs), Vector3::z());
         assert_eq!(spreads(corners().iter().map(|p| p.coords)), [0.0, 1.0, 1.0]);
         assert_eq!(mean(std::iter::empty::<Vector3<f64>>()), Vector3::zeros());
     }

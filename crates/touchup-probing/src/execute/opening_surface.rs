@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 use nalgebra::{Isometry3, Point2, Point3, Unit, Vector3};
 
 use touchup_geometry::mesh::TriMesh;
-use touchup_geometry::numeric::{mean, scatter, turned_to};
+use touchup_geometry::numeric::{mean, scatter, thinnest_direction, turned_to};
 
 /// Rings around the flag in the search for the surface: the wall of an opening is searched no
 /// farther than the last, 12 mm.
@@ -88,11 +88,7 @@ impl LevelPlane {
                 .filter(|place| self.has(place))
                 .map(|place| place.coords)
         };
-        let axes = scatter(places()).symmetric_eigen();
-        let normal = axes
-            .eigenvectors
-            .column(axes.eigenvalues.imin())
-            .into_owned();
+        let normal = thinnest_direction(scatter(places()));
         let normal = Unit::try_new(normal * normal.z.signum(), 0.0)?;
         (normal.z > ALIKE).then(|| Self {
             point: mean(places()).into(),

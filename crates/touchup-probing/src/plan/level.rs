@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
 
 use super::search_context::SearchContext;
 use touchup_features::features::fit::{FitParams, Observation, Plane, fit};
-use touchup_geometry::numeric::{mean, scatter};
+use touchup_geometry::numeric::{mean, scatter, thinnest_direction};
 
 /// Maximum distance of a plane's touches from it, m.
 const OF_PLANE: f64 = 60e-6;
@@ -101,12 +101,7 @@ impl SearchContext {
                 }
             }
         }
-        let scatter = scatter(best.iter().map(|o| o.point.coords));
-        let axes = scatter.symmetric_eigen();
-        let normal = axes
-            .eigenvectors
-            .column(axes.eigenvalues.imin())
-            .into_owned();
+        let normal = thinnest_direction(scatter(best.iter().map(|o| o.point.coords)));
         let normal = Unit::try_new(normal * normal.dot(&self.out()).signum(), 0.0)?;
         (best.len() >= 3).then_some((normal, best))
     }

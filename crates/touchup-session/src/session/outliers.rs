@@ -3,7 +3,7 @@
 use std::fmt;
 
 use crate::reported;
-use touchup_geometry::numeric::counted;
+use touchup_geometry::numeric::{counted, median};
 use touchup_method::reconstruct::{Outlier, Outliers, PatchedMesh, Support};
 
 reported! {
@@ -29,8 +29,7 @@ fn touched_sigma_mm(patched: &PatchedMesh) -> f64 {
         .filter(|(_, support)| **support == Support::Touched)
         .map(|(sigma, _)| sigma * 1e3)
         .collect();
-    touched.sort_by(f64::total_cmp);
-    touched.get(touched.len() / 2).copied().unwrap_or_default()
+    median(&mut touched).unwrap_or_default()
 }
 
 reported! {

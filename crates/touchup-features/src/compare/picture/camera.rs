@@ -1,8 +1,9 @@
 //! Viewpoint of the pictures.
 
-use nalgebra::{Matrix2, Point3, Vector2, Vector3};
+use nalgebra::{Point3, Vector2, Vector3};
 
 use touchup_geometry::mesh::{FaceId, TriMesh, VertexId};
+use touchup_geometry::numeric::scatter;
 
 /// Tilt of the view from the direction of touch: about 37°, so that walls and steps are visible
 /// too.
@@ -72,15 +73,7 @@ impl Camera {
     fn longest(&self, mesh: &TriMesh) -> Vector3<f64> {
         let flat =
             |p: &Point3<f64>| Vector2::new(self.right.dot(&p.coords), self.up.dot(&p.coords));
-        let count = mesh.positions().len().max(1) as f64;
-        let middle = mesh.positions().iter().map(flat).sum::<Vector2<f64>>() / count;
-        let spread: Matrix2<f64> = mesh
-            .positions()
-            .iter()
-            .map(|p| flat(p) - middle)
-            .map(|d| d * d.transpose())
-            .sum();
-        let eigen = spread.symmetric_eigen();
+        let eigen = scatter(mesh.positions().iter().map(flat)).symmetric_eigen();
         let v = eigen.eigenvectors.column(eigen.eigenvalues.imax());
         let across = self.right * v[0] + self.up * v[1];
         if across[across.iamax()] < 0.0 {

@@ -23,7 +23,7 @@ use crate::features::segmentation::scene::SegmentedMesh;
 use crate::features::segmentation::segment::Segment;
 use crate::features::walls::ALL_AROUND;
 use touchup_geometry::mesh::{BoxQuery, FaceId};
-use touchup_geometry::numeric::{distinct, mean, median, tangent_basis};
+use touchup_geometry::numeric::{distinct, mean, median, scatter, tangent_basis};
 use touchup_method::stylus::ProbedPoint;
 
 /// Maximum number of pairs, and of triples, of contacts to try in one group.
@@ -425,12 +425,7 @@ fn is_edge(touches: &[ProbedPoint], members: &[usize], plane: &Plane) -> bool {
     let basis = tangent_basis(&plane.normal());
     let spread = |of: fn(&ProbedPoint) -> Vector3<f64>| -> Matrix2<f64> {
         let seen = |&at: &usize| basis.map(|axis| of(&touches[at]).dot(&axis));
-        let all: Vec<Vector2<f64>> = members.iter().map(seen).map(Vector2::from).collect();
-        let mean = all.iter().sum::<Vector2<f64>>() / all.len() as f64;
-        all.iter()
-            .map(|v| (v - mean) * (v - mean).transpose())
-            .sum::<Matrix2<f64>>()
-            / all.len() as f64
+        scatter(members.iter().map(seen).map(Vector2::from)) / members.len() as f64
     };
     let centres = spread(|touch| touch.centre.coords);
     let eigen = centres.symmetric_eigen();
@@ -459,13 +454,9 @@ const CORNER_TURN: f64 = 0.12;
 fn plane_through(touches: &[ProbedPoint], members: &[usize]) -> Option<Plane> {
     let normal: Vector3<f64> = members.iter().map(|&at| touches[at].normal).sum();
     let normal = normal.try_normalize(0.0)?;
-    let middle = mean(members.iter().map(|&at| touches[at].centre.coords));
-    let spread: nalgebra::Matrix3<f64> = members
-        .iter()
-        .map(|&at| touches[at].centre.coords - middle)
-        .map(|v| v * v.transpose())
-        .sum();
-    let eigen = (spread / members.len() as f64).symmetric_eigen();
+    let centres = members.iter().map(|&at| touches[at].centre.coords);
+    let middle = mean(centres.clone());
+    let eigen = (scatter(centres) / members.len() as f64).symmetric_eigen();
     let widths = [0, 1, 2].map(|i| eigen.eigenvalues[i].max(0.0).sqrt());
     let longest = eigen
         .eigenvectors

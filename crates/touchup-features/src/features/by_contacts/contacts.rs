@@ -3,11 +3,13 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use nalgebra::{Matrix3, Point2, Point3, Vector2, Vector3};
+use nalgebra::{Point2, Point3, Vector2, Vector3};
 
 use crate::features::fit::SurfaceModel;
 use crate::features::segmentation::scene::SegmentedMesh;
-use touchup_geometry::numeric::{DisjointSets, PointGrid, VoxelKey, spreads, voxel_of};
+use touchup_geometry::numeric::{
+    DisjointSets, PointGrid, VoxelKey, spreads, thinnest_direction, voxel_of,
+};
 use touchup_method::stylus::ProbedPoint;
 
 /// Cell size of thinning, as a share of the ball's radius: one contact is enough.
@@ -120,12 +122,7 @@ pub(in crate::features) fn axes(
         let normals = members.iter().map(|&at| touches[at].normal);
         let [least, second, _] = spreads(normals.clone());
         if members.len() >= LEAST && least < 0.5 * second {
-            let second_moment: Matrix3<f64> = normals.map(|n| n * n.transpose()).sum();
-            let eigen = second_moment.symmetric_eigen();
-            add(eigen
-                .eigenvectors
-                .column(eigen.eigenvalues.imin())
-                .into_owned());
+            add(thinnest_direction(normals.map(|n| n * n.transpose()).sum()));
         }
     }
     axes

@@ -6,7 +6,7 @@ use nalgebra::{Matrix2, Matrix3, Point3, SVector, Vector2, Vector3};
 use super::facets::Facets;
 use crate::features::fit::{Cone, Cylinder, FREEDOMS, Freedom, Plane, Steps, SurfaceModel};
 use touchup_geometry::mesh::{FaceId, VertexId};
-use touchup_geometry::numeric::{NormalEquations, tangent_basis};
+use touchup_geometry::numeric::{NormalEquations, tangent_basis, thinnest_direction};
 
 /// The surface of a piece of the mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -149,11 +149,7 @@ pub(in crate::features) fn plane_of(
     if !spread.iter().all(|x| x.is_finite()) {
         return None;
     }
-    let eigen = spread.symmetric_eigen();
-    let normal = eigen
-        .eigenvectors
-        .column(eigen.eigenvalues.imin())
-        .into_owned();
+    let normal = thinnest_direction(spread);
     // faces on a line have no thinnest direction of their own
     let cosine = normal.dot(&towards);
     let normal = if cosine.abs() > 0.9 {

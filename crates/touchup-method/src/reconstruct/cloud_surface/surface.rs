@@ -8,7 +8,7 @@ use super::normals::{PointNeighbourhood, oriented};
 use super::summary::CloudSummary;
 use crate::reconstruct::lattice::Lattice;
 use touchup_geometry::mesh::{PointCloud, PointTree, Workers, map_by};
-use touchup_geometry::numeric::DisjointSets;
+use touchup_geometry::numeric::{DisjointSets, median};
 
 /// Minimum number of points: a plane fit takes half of them as neighbours, the others lie farther
 /// away.
@@ -102,8 +102,11 @@ pub fn surface_of_cloud(
     }
     let tree = PointTree::new(&points.positions);
     let near = PointNeighbourhood::of_all(&points.positions, &tree, workers);
-    let spacing = median(near.iter().map(|near| near.spacing).collect());
-    let noise = median(near.iter().map(|near| near.noise).collect());
+    let median_of = |number: fn(&PointNeighbourhood) -> f64| {
+        median(&mut near.iter().map(number).collect::<Vec<_>>()).unwrap_or_default()
+    };
+    let spacing = median_of(|near| near.spacing);
+    let noise = median_of(|near| near.noise);
     let (normals, source) = oriented(&points, &near);
     let kept: Vec<usize> = (0..left)
         .filter(|&at| near[at].spacing <= ISOLATED * spacing)
@@ -146,11 +149,6 @@ pub fn surface_of_cloud(
         faces,
         summary,
     })
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 /// Removes faces with a vertex outside the scanned area.

@@ -18,6 +18,7 @@ use crate::reconstruct::evidence::point_evidence::Evidence;
 use crate::reconstruct::lattice::VertexKey;
 use crate::reconstruct::support::Support;
 use touchup_geometry::mesh::{BoxQuery, FaceTree, TriMesh, VertexId};
+use touchup_geometry::numeric::median;
 
 /// Maximum edge length of a scan finer than the tip, in radii.
 const FINE: f64 = 0.36;
@@ -263,11 +264,8 @@ impl<'a> Fineness<'a> {
             }
             self.around.push(*scatter);
         }
-        if self.around.is_empty() || longest >= (2.0 * FINE * radius).powi(2) {
-            return false;
-        }
-        let middle = self.around.len() / 2;
-        *self.around.select_nth_unstable_by(middle, f64::total_cmp).1 < SCATTER * radius
+        longest < (2.0 * FINE * radius).powi(2)
+            && median(&mut self.around).is_some_and(|middle| middle < SCATTER * radius)
     }
 }
 
