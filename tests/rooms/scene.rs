@@ -730,6 +730,10 @@ fn settings_are_set_by_key_in_its_unit() {
         Some(StepRule::DormandPrince)
     );
 
+    let mut told = Scene::from_yaml("tip: { radius_mm: 2 }").unwrap();
+    told.set(&[Setting::number("tip.radius_mm", 3.0)]).unwrap();
+    assert_eq!(told.tip_params().radius, 3e-3);
+
     for wrong in [
         Setting::number("tip.radius", 1.0),
         Setting::number("tip", 1.0),

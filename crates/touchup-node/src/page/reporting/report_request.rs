@@ -1,10 +1,11 @@
 //! Request of a report by a page: the source of the nominal values, and the flags of `touchup
 //! inspect`.
 
-use std::collections::BTreeMap;
+use std::fmt;
 use std::path::{Path, PathBuf};
 
-use serde::Deserialize;
+use serde::de::{MapAccess, Visitor};
+use serde::{Deserialize, Deserializer};
 
 use touchup_inspect::InspectionParams;
 use touchup_io::mesh_file::MeshUnit;
@@ -41,9 +42,26 @@ pub(in crate::page) struct ReportRequest {
     file: String,
     /// unit of a CAD mesh; default: that of the session
     unit: Option<MeshUnit>,
-    /// values of the flags of `touchup inspect`, by their names
-    #[serde(flatten)]
-    settings: BTreeMap<String, String>,
+    /// names and values of flags of `touchup inspect`
+    #[serde(flatten, deserialize_with = "settings")]
+    settings: Vec<(String, String)>,
+}
+
+/// Entries of a map in their order; a repeated name stays, for the parser of the flags to refuse.
+fn settings<'de, D: Deserializer<'de>>(query: D) -> Result<Vec<(String, String)>, D::Error> {
+    struct Settings;
+    impl<'de> Visitor<'de> for Settings {
+        type Value = Vec<(String, String)>;
+
+        fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+            formatter.write_str("settings by name")
+        }
+
+        fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Self::Value, A::Error> {
+            std::iter::from_fn(|| map.next_entry().transpose()).collect()
+        }
+    }
+    query.deserialize_map(Settings)
 }
 
 impl ReportRequest {
@@ -58,7 +76,7 @@ impl ReportRequest {
         let settings = self
             .settings
             .iter()
-            .map(|(name, value)| (&**name, &**value));
+            .map(|(name, value)| (name.as_str(), value.as_str()));
         let mut params = InspectionParams::named(settings.chain([unit]))?;
         let report = &mut params.report;
         report.part = text("part", &report.part)?;
@@ -206,6 +224,10 @@ mod tests {
             serde_json::json!({ "nominal": "part", "general": "iso2768-f", "tolerance_mm": "1" });
         let why = request(both).params(MeshUnit::Millimetre).unwrap_err();
         assert!(why.contains("cannot be used with"), "{why}");
+        let repeated = r#"{ "nominal": "part", "k": "1", "k": "2" }"#;
+        let request: ReportRequest = serde_json::from_str(repeated).unwrap();
+        let why = request.params(MeshUnit::Millimetre).unwrap_err();
+        assert!(why.contains("'--k <K>' cannot be used multiple"), "{why}");
     }
 
     #[test]
