@@ -7,7 +7,7 @@ use chrono::{DateTime, SecondsFormat, Utc};
 use nalgebra::Point3;
 
 use super::alignment::{Alignment, aligned};
-use super::drawing::{DrawingParams, DrawnCharacteristic, PartDrawing};
+use super::drawing::{DrawnCharacteristic, PartDrawing};
 use super::drawn_feature::shape_of;
 use super::measured::{CharacteristicMeasurement, is_of_mesh, measurement, missing_touches};
 use super::source::InspectionSource;
@@ -59,9 +59,7 @@ pub fn inspected(
     params: &InspectionParams,
 ) -> Result<Inspection, InspectionError> {
     let drawn = &drawing.characteristics;
-    let DrawingParams {
-        match_mm, align, ..
-    } = &params.drawing;
+    let (match_mm, align) = (&params.drawing.match_mm, &params.drawing.align);
     let by = |method| aligned(&drawing.features, &source.features, method, *match_mm);
     let alignment = align.as_ref().map(by).transpose()?;
     let file = alignment
@@ -70,10 +68,8 @@ pub fn inspected(
     let groups = groups_of(drawn);
     let found = match_all(drawn, &groups, file, match_mm * 1e-3);
     let mut balloons = Vec::new();
-    let (mut characteristics, mut runs) = (
-        vec![CharacteristicRecord::default(); drawn.len()],
-        vec![Vec::new(); drawn.len()],
-    );
+    let mut characteristics = vec![CharacteristicRecord::default(); drawn.len()];
+    let mut runs = vec![Vec::new(); drawn.len()];
     for (number, group) in (1..).zip(&groups) {
         let first = &drawn[group[0]].nominal;
         let matched = &found.features[number - 1];
@@ -81,15 +77,8 @@ pub fn inspected(
         let feature = found_feature(matched, &source.features);
         for (index, &at) in (1..).zip(group) {
             let place = format!("{number}.{index}");
-            let matched = MatchedCharacteristic {
-                drawn: &drawn[at],
-                feature_match: matched,
-                datum_match: found.datums[at].as_ref(),
-                feature: found_feature(matched, file),
-                datum: found.datums[at]
-                    .as_ref()
-                    .and_then(|datum| found_feature(datum, file)),
-            };
+            let datum = found.datums[at].as_ref();
+            let matched = MatchedCharacteristic::of(&drawn[at], matched, datum, file);
             let measured = matched.measured(file, align.is_some());
             characteristics[at] = matched.record(place, &measured, params);
             runs[at] = measured.runs;
@@ -271,7 +260,22 @@ struct MatchedCharacteristic<'a> {
     datum: Option<&'a FeatureRecord>,
 }
 
-impl MatchedCharacteristic<'_> {
+impl<'a> MatchedCharacteristic<'a> {
+    fn of(
+        drawn: &'a DrawnCharacteristic,
+        feature_match: &'a FeatureMatch,
+        datum_match: Option<&'a FeatureMatch>,
+        file: &'a FeatureFile,
+    ) -> Self {
+        Self {
+            drawn,
+            feature_match,
+            datum_match,
+            feature: found_feature(feature_match, file),
+            datum: datum_match.and_then(|datum| found_feature(datum, file)),
+        }
+    }
+
     fn measured(&self, file: &FeatureFile, is_aligned: bool) -> CharacteristicMeasurement {
         let nominal = &self.drawn.nominal;
         match (self.feature, self.datum_match, self.datum) {
