@@ -25,6 +25,7 @@ use touchup_geometry::mesh::{FaceTree, TriMesh};
 use touchup_io::features_file::{FeatureRecord, read_features};
 use touchup_io::mesh_file::{MeshUnit, VertexColumn, read_vertex_columns};
 use touchup_session::scan::{Scan, read_scan};
+use touchup_session::session::ResultFiles;
 use touchup_session::threads::Threads;
 
 /// Tolerance in the picture of a folder, mm: medium of ISO 2768-1 for lengths of up to 6 mm.
@@ -210,7 +211,7 @@ impl CompareArguments {
     ///
     /// - `named`: features to label in the picture.
     pub(super) fn in_folder(folder: &Path, named: Vec<FeatureRecord>) -> Self {
-        let [mesh, truth] = ["refined.ply", "truth.ply"].map(|name| folder.join(name));
+        let [mesh, truth] = [ResultFiles::MESH, "truth.ply"].map(|name| folder.join(name));
         let [before, picture] = ["scan.ply", "deviation.png"].map(|name| Some(folder.join(name)));
         let tolerance_mm = Some(TOLERANCE_MM);
         Self {

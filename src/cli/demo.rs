@@ -37,6 +37,7 @@ use touchup_session::refinement::RefinementOptions;
 use touchup_session::replay::RecordedAs;
 #[cfg(any(feature = "ros", feature = "r2r"))]
 use touchup_session::replay::Recording;
+use touchup_session::session::ResultFiles;
 use touchup_sim::{
     PathParams, Plate, ScanQuality, ScannerParams, StylusParams, Surface, measure_quality,
     plan_demo,
@@ -149,9 +150,9 @@ pub(super) fn demo(arguments: &DemoArguments) -> Result<Losses, CliError> {
         summary, losses, ..
     } = files.refine(scene, told, RefinementOptions::default())?;
     // measures the mesh as written
-    let MeshFile { mesh: refined, .. } = read_mesh(&files.mesh_out, unit)?;
+    let MeshFile { mesh: refined, .. } = read_mesh(&files.out.mesh, unit)?;
 
-    let named = read_features(&out.join("features.json"))?.features;
+    let named = read_features(&out.join(ResultFiles::FEATURES))?.features;
     let found = FoundTable::of(&plate.features(), &named);
     compared(&CompareArguments::in_folder(out, named))?;
 

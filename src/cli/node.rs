@@ -27,6 +27,7 @@ use touchup_session::clock::Clock;
 use touchup_session::live::Quantiles;
 use touchup_session::scan::{Scan, read_scan};
 use touchup_session::scene::Scene;
+use touchup_session::session::ResultFiles;
 
 #[derive(Debug, Args)]
 pub(super) struct NodeArguments {
@@ -248,7 +249,7 @@ pub(super) fn end_text(NodeEnd { folder, report }: &NodeEnd) -> String {
     format!(
         "{}\nwrote {}",
         report_text(report),
-        folder.join("refined.ply").display()
+        folder.join(ResultFiles::MESH).display()
     )
 }
 

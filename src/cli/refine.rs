@@ -23,7 +23,7 @@ use touchup_session::live::Pace;
 use touchup_session::refinement::RefinementOptions;
 use touchup_session::replay::RecordedAs;
 use touchup_session::scene::{Mode, Scene};
-use touchup_session::session::{SessionRecord, StrokeChanges};
+use touchup_session::session::{ResultFiles, SessionRecord, StrokeChanges};
 
 #[derive(Clone, Debug, Default, Args)]
 pub(super) struct RefineArguments {
@@ -132,13 +132,12 @@ impl RefineArguments {
             (self.scan, self.mesh_unit, self.scene) = (scan, mesh_unit, Some(scene));
             (self.bag, self.recorded.location) = (recording, topics.into());
             self.strokes = strokes;
+            let there = ResultFiles::in_folder(&session);
             if self.out.as_os_str().is_empty() {
-                self.out = session.join("refined.ply");
+                self.out = there.mesh;
             }
-            self.features_out
-                .get_or_insert_with(|| session.join("features.json"));
-            self.touches_out
-                .get_or_insert_with(|| session.join("touches.csv"));
+            self.features_out = self.features_out.or(there.features);
+            self.touches_out = self.touches_out.or(there.touches);
         } else if let Some(path) = self
             .scene
             .as_ref()
@@ -243,9 +242,11 @@ impl RefineArguments {
                 stamp: Some(self.recorded.stamp.to_string()),
                 ..self.recorded.location.clone()
             },
-            mesh_out: self.out.clone(),
-            features_out: self.features_out.clone(),
-            touches_out: self.touches_out.clone(),
+            out: ResultFiles {
+                mesh: self.out.clone(),
+                features: self.features_out.clone(),
+                touches: self.touches_out.clone(),
+            },
         };
         let options = RefinementOptions {
             live: self.live.then(Pace::default),

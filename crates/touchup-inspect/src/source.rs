@@ -13,6 +13,7 @@ use touchup_io::probed_touches_file::{TouchLine, read_probed_touches};
 use touchup_io::session_folder::{fingerprint, read_text};
 use touchup_io::touches_file::read_touches;
 use touchup_method::stylus::ProbedPoint;
+use touchup_session::session::ResultFiles;
 
 /// Measurement from its files.
 pub struct InspectionSource {
@@ -51,7 +52,7 @@ impl InspectionSource {
         let [touches_path, mesh, scene] = named;
         let (touches_path, mesh) = (
             beside(touches_path, touches_name),
-            beside(mesh, "refined.ply"),
+            beside(mesh, ResultFiles::MESH),
         );
         let scene = beside(scene, "scene.yaml");
         let touches = touches_path
@@ -115,7 +116,7 @@ impl InspectionSource {
             touches.extend(of_flag.into_iter().map(point_of));
             found.features.push(renumbered(feature, flag, offset));
         }
-        let (mesh, scene) = (beside(mesh, "refined.ply"), beside(scene, "scene.yaml"));
+        let (mesh, scene) = (beside(mesh, ResultFiles::MESH), beside(scene, "scene.yaml"));
         check_touches(&found, &touches, Some(&probed_path))?;
         let mut files = vec![inspected_file("features of the arm", path)?];
         let probed_path = probed_path.is_file().then_some(probed_path);
@@ -153,7 +154,7 @@ fn not_read(path: &Path, source: io::Error) -> InspectionError {
 /// Names of features and touches files in a folder: from a finished or refined session, else from
 /// `~/save_mesh` of a running session.
 const IN_FOLDER: [(&str, &str); 2] = [
-    ("features.json", "touches.csv"),
+    (ResultFiles::FEATURES, ResultFiles::TOUCHES),
     ("refined.features.json", "refined.touches.csv"),
 ];
 

@@ -19,7 +19,7 @@ use touchup_session::refinement::{
 };
 use touchup_session::replay::RecordedAs;
 use touchup_session::scene::{LeftOut, Memory, Scene, SceneCost};
-use touchup_session::session::OutcomePlaces;
+use touchup_session::session::ResultFiles;
 
 /// Input and output files of a refinement.
 #[derive(Clone, Debug)]
@@ -29,9 +29,7 @@ pub(in crate::cli) struct RefinementFiles {
     pub mesh_unit: MeshUnit,
     pub recording: PathBuf,
     pub recorded: RecordedAs,
-    pub mesh_out: PathBuf,
-    pub features_out: Option<PathBuf>,
-    pub touches_out: Option<PathBuf>,
+    pub out: ResultFiles,
 }
 
 /// Output of `--json`; times in s.
@@ -74,9 +72,7 @@ impl RefinementFiles {
             mesh_unit,
             recording: folder.join(recording),
             recorded,
-            mesh_out: folder.join("refined.ply"),
-            features_out: Some(folder.join("features.json")),
-            touches_out: Some(folder.join("touches.csv")),
+            out: ResultFiles::in_folder(folder),
         }
     }
 
@@ -124,14 +120,7 @@ impl RefinementFiles {
             .findings
             .iter()
             .for_each(|finding| warn!("{finding}"));
-        let places = OutcomePlaces {
-            mesh: &self.mesh_out,
-            unit: self.mesh_unit,
-            scan: &self.scan,
-            features: self.features_out.as_deref(),
-            touches: self.touches_out.as_deref(),
-        };
-        places.write(mesh)?;
+        self.out.write(mesh, &self.scan, self.mesh_unit)?;
         drop(stage);
         let summary = RefineSummary {
             scene,

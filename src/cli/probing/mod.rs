@@ -36,6 +36,7 @@ use touchup_probing::execute::{Ending, Flag, FlagResult, Plan};
 use touchup_session::probing_run::ProbingRun;
 use touchup_session::refinement::RefinementOptions;
 use touchup_session::replay::RecordedAs;
+use touchup_session::session::ResultFiles;
 use world::LiveWorld;
 pub(super) use world::{KeptMeasurements, SpotWorld};
 
@@ -181,7 +182,7 @@ impl Probing<'_> {
                 let refined = self.refined(&touched);
                 if refined.is_ok() {
                     let MeshFile { mesh, .. } =
-                        read_mesh(&self.out.join("refined.ply"), self.unit)?;
+                        read_mesh(&self.out.join(ResultFiles::MESH), self.unit)?;
                     let drawn = self.out.join("touches.png");
                     draw_touches(&mesh, &touched, &probed, self.flags, &drawn)?;
                 }

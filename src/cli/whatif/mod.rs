@@ -15,6 +15,7 @@ use self::tables::{features_table, vertices_table, write_moved_mesh};
 use super::common::progress::WorkProgress;
 use super::sweep::check_table;
 use super::{CliError, Losses, check_kept_by, check_outputs, not_written, print_report, require};
+use touchup_session::session::ResultFiles;
 use touchup_session::sweep::{JobResult, JobsFile, WhatIf};
 
 #[derive(Debug, Args)]
@@ -157,7 +158,7 @@ impl WhatIfArguments {
             require(folder.is_dir(), why)?;
             for (flag, path) in [("--out", &self.out), ("--mesh-out", &self.mesh_out)] {
                 path.iter().try_for_each(|path| {
-                    check_kept_by(flag, "A or B", &folder.join("refined.ply"), path)
+                    check_kept_by(flag, "A or B", &folder.join(ResultFiles::MESH), path)
                 })?;
             }
         }

@@ -11,7 +11,7 @@ use super::channels::{FeatureInput, ViewInput};
 use super::error::NodeError;
 use super::feature_messages::kind_of;
 use super::refinement::RefinementWorker;
-use super::session::ResultFiles;
+use super::session::write_result;
 use super::take_out::BUSY;
 use crate::ros::convert::{header, point_of, stamp_ns, trigger};
 use crate::ros::messages::{
@@ -26,6 +26,7 @@ use touchup_features::features::FeatureKind;
 use touchup_io::session_folder::SessionFolder;
 use touchup_probing::execute::Flag;
 use touchup_session::live::EngineResult;
+use touchup_session::session::ResultFiles;
 use touchup_session::session::{StrokeChange, UndoStep};
 
 /// Maximum radius of a flag, m.
@@ -35,7 +36,6 @@ const MOST_STROKES: u32 = 1000;
 /// Maximum wait for the complete mesh and patch of a file.
 const COPY_WAIT: Duration = Duration::from_secs(30);
 /// Default name of a file.
-const DEFAULT_NAME: &str = "refined.ply";
 /// Maximum number of concurrent saves: each has a copy of all touches.
 const MOST_SAVING: usize = 4;
 
@@ -333,7 +333,7 @@ impl RefinementWorker {
                     EngineResult::Moved(mesh.map_err(|why| why.to_string())?.into())
                 }
             };
-            let outcome = files.write(&setup, result);
+            let outcome = write_result(&setup, result, &files);
             let [vertices, faces] = outcome.map_err(|why| why.to_string())?.counts;
             let path = files.mesh.display().to_string();
             Ok(SaveMeshResponse {
@@ -375,7 +375,7 @@ impl RefinementWorker {
 /// The files of one call of `~/save_mesh`.
 fn files_of(folder: &SessionFolder, request: &SaveMeshRequest) -> Result<ResultFiles, String> {
     let name = if request.name.is_empty() {
-        DEFAULT_NAME
+        ResultFiles::MESH
     } else {
         &request.name
     };
@@ -397,8 +397,8 @@ fn files_of(folder: &SessionFolder, request: &SaveMeshRequest) -> Result<ResultF
             .transpose()
     };
     Ok(ResultFiles {
-        features: beside("features.json")?,
-        touches: beside("touches.csv")?,
+        features: beside(ResultFiles::FEATURES)?,
+        touches: beside(ResultFiles::TOUCHES)?,
         mesh,
     })
 }

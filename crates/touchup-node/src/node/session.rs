@@ -18,8 +18,8 @@ use touchup_io::session_folder::SessionFolder;
 use touchup_method::stylus::{Synchroniser, WrenchFrame};
 use touchup_session::live::{Engine, EngineResult, Gate, Latencies, Pace, Quantiles, TouchDelta};
 use touchup_session::session::{
-    Outcome, OutcomeError, OutcomePlaces, RecordingLoss, RefinedMesh, SessionRecord,
-    SessionRecorder, StrokeChanges,
+    Outcome, OutcomeError, RecordingLoss, RefinedMesh, ResultFiles, SessionRecord, SessionRecorder,
+    StrokeChanges,
 };
 
 /// Numbers of accepted, refused and skipped input.
@@ -260,14 +260,8 @@ impl NodeSession {
         } = recorder.finish();
         report.unrecorded = messages;
         let result = engine.finish()?.into_result();
-        let [mesh, features, touches] =
-            ["refined.ply", "features.json", "touches.csv"].map(|name| folder.path().join(name));
-        let files = ResultFiles {
-            mesh,
-            features: Some(features),
-            touches: Some(touches),
-        };
-        let outcome = files.write(setup, result).inspect_err(|_| {
+        let files = ResultFiles::in_folder(folder.path());
+        let outcome = write_result(setup, result, &files).inspect_err(|_| {
             if let Some(reason) = &reason {
                 tracing::error!("{messages} messages are not in the session's recording: {reason}");
             }
@@ -355,34 +349,19 @@ fn engine_of(setup: &Setup, axes: WrenchFrame) -> Result<Engine, NodeError> {
     Ok(engine)
 }
 
-/// The files of a result.
-pub struct ResultFiles {
-    /// path of the mesh, as in [`OutcomePlaces`]
-    pub mesh: PathBuf,
-    /// path of the features, if any
-    pub features: Option<PathBuf>,
-    /// path of the touches, if any
-    pub touches: Option<PathBuf>,
-}
-
-impl ResultFiles {
-    /// Writes the files, as `touchup refine` does.
-    ///
-    /// # Errors
-    /// [`OutcomeError`]
-    pub fn write(&self, setup: &Setup, result: EngineResult) -> Result<Outcome, Box<OutcomeError>> {
-        let outside = setup.input.cut.outside.as_ref();
-        let (mesh, outcome) = RefinedMesh::of(&setup.input.scan, result, outside, false)?;
-        let places = OutcomePlaces {
-            mesh: &self.mesh,
-            unit: setup.mesh_unit,
-            scan: &setup.scan_path,
-            features: self.features.as_deref(),
-            touches: self.touches.as_deref(),
-        };
-        places.write(mesh)?;
-        Ok(outcome)
-    }
+/// Writes the files of a result, as `touchup refine` does.
+///
+/// # Errors
+/// [`OutcomeError`]
+pub fn write_result(
+    setup: &Setup,
+    result: EngineResult,
+    files: &ResultFiles,
+) -> Result<Outcome, Box<OutcomeError>> {
+    let outside = setup.input.cut.outside.as_ref();
+    let (mesh, outcome) = RefinedMesh::of(&setup.input.scan, result, outside, false)?;
+    files.write(mesh, &setup.scan_path, setup.mesh_unit)?;
+    Ok(outcome)
 }
 
 /// "2026-11-20T22-14-10Z": sorts by time, and is a file name everywhere.

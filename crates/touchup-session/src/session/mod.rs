@@ -11,7 +11,7 @@ mod remade;
 mod strokes;
 
 pub use outcome::{
-    Origins, Outcome, OutcomeError, OutcomePlaces, PatchSummary, RefinedMesh, found, moved_faces,
+    Origins, Outcome, OutcomeError, PatchSummary, RefinedMesh, ResultFiles, found, moved_faces,
     origins, sewn,
 };
 pub use outliers::UncertaintySummary;

@@ -1,7 +1,7 @@
 //! The result as files: mesh, features, touches.
 
 use std::fmt;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use nalgebra::Point3;
@@ -46,20 +46,16 @@ pub enum OutcomeError {
     Contradictory(String),
 }
 
-/// Output files of a result.
-#[derive(Clone, Copy, Debug)]
-pub struct OutcomePlaces<'a> {
+/// Paths of the files of a result.
+#[derive(Clone, Debug)]
+pub struct ResultFiles {
     /// the refined mesh
-    pub mesh: &'a Path,
-    /// unit of its coordinates, and of the scan's
-    pub unit: MeshUnit,
-    /// the file of the scan, source of colours and texture coordinates
-    pub scan: &'a Path,
+    pub mesh: PathBuf,
     /// features of the refined mesh, measured by the touches: a table for a name in `.csv` or
-    /// `.parquet`, else JSON
-    pub features: Option<&'a Path>,
-    /// the touches of the features: Parquet for a name in `.parquet`, else CSV
-    pub touches: Option<&'a Path>,
+    /// `.parquet`, else JSON; `None`: not written
+    pub features: Option<PathBuf>,
+    /// the touches of the features: Parquet for a name in `.parquet`, else CSV; `None`: not written
+    pub touches: Option<PathBuf>,
 }
 
 /// Result on the touched part.
@@ -332,12 +328,36 @@ impl Outcome {
     }
 }
 
-impl OutcomePlaces<'_> {
+impl ResultFiles {
+    /// Name of the mesh in a folder of results.
+    pub const MESH: &str = "refined.ply";
+    /// Name of the features there.
+    pub const FEATURES: &str = "features.json";
+    /// Name of the touches there.
+    pub const TOUCHES: &str = "touches.csv";
+
+    /// All files, in a folder of results.
+    pub fn in_folder(folder: &Path) -> Self {
+        Self {
+            mesh: folder.join(Self::MESH),
+            features: Some(folder.join(Self::FEATURES)),
+            touches: Some(folder.join(Self::TOUCHES)),
+        }
+    }
+
     /// Writes mesh, touches and features.
+    ///
+    /// - `scan`: file of the scan, source of colours and texture coordinates.
+    /// - `unit`: unit of the coordinates in its file and in the mesh's.
     ///
     /// # Errors
     /// [`OutcomeError`]; no file is left half written.
-    pub fn write(&self, refined: RefinedMesh) -> Result<(), OutcomeError> {
+    pub fn write(
+        &self,
+        refined: RefinedMesh,
+        scan: &Path,
+        unit: MeshUnit,
+    ) -> Result<(), OutcomeError> {
         let RefinedMesh {
             mesh,
             origins,
@@ -345,8 +365,8 @@ impl OutcomePlaces<'_> {
             touches,
             ..
         } = refined;
-        self.write_mesh(&mesh, &origins, columns)?;
-        self.write_features(&touches)
+        self.write_mesh(&mesh, &origins, columns, scan, unit)?;
+        self.write_features(&touches, unit)
     }
 
     /// Writes the mesh with the colours and texture coordinates of the scan.
@@ -355,30 +375,32 @@ impl OutcomePlaces<'_> {
         mesh: &TriMesh,
         origins: &[Option<Point3<f64>>],
         mut columns: Vec<VertexColumn>,
+        scan: &Path,
+        unit: MeshUnit,
     ) -> Result<(), OutcomeError> {
         let places = origins
             .iter()
             .zip(mesh.positions())
             .map(|(origin, here)| origin.unwrap_or(*here));
-        let carried = carried_over(self.scan, self.unit, mesh, &places.collect::<Vec<_>>());
+        let carried = carried_over(scan, unit, mesh, &places.collect::<Vec<_>>());
         let (colours, texture) = carried.unwrap_or_else(|error| {
             warn!("colours and texture coordinates of the scan are not carried over: {error}");
             Default::default()
         });
         columns.extend(colours);
-        write_mesh_with(self.mesh, mesh, &columns, texture.as_ref(), self.unit)
+        write_mesh_with(&self.mesh, mesh, &columns, texture.as_ref(), unit)
             .map_err(OutcomeError::WriteMesh)
     }
 
     /// Writes the requested touches and features of the result: from the written mesh and touches,
     /// so `touchup features` finds the same to the last bit.
-    fn write_features(&self, touches: &[ProbedPoint]) -> Result<(), OutcomeError> {
-        if let Some(out) = self.touches {
+    fn write_features(&self, touches: &[ProbedPoint], unit: MeshUnit) -> Result<(), OutcomeError> {
+        if let Some(out) = &self.touches {
             write_touches_as_named(out, touches)?;
         }
-        if let Some(out) = self.features {
+        if let Some(out) = &self.features {
             let MeshFile { mesh, .. } =
-                read_mesh(self.mesh, self.unit).map_err(OutcomeError::ReadMesh)?;
+                read_mesh(&self.mesh, unit).map_err(OutcomeError::ReadMesh)?;
             write_features_as_named(out, &found(&mesh, &as_written(touches)).1)?;
         }
         Ok(())

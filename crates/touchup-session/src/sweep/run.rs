@@ -14,7 +14,7 @@ use super::summary::JobSummary;
 use crate::refinement::{
     InputNames, OpenedInput, RefinedScan, RefinementError, RefinementOptions, refine,
 };
-use crate::session::{OutcomeError, OutcomePlaces};
+use crate::session::{OutcomeError, ResultFiles};
 use touchup_io::content_hash::{content_hash, hash_of};
 use touchup_io::features_file::read_features;
 use touchup_io::file_error::FileError;
@@ -24,8 +24,6 @@ use touchup_io::text_file::{read_text, write_text};
 
 pub(super) const SUMMARY: &str = "summary.json";
 pub(super) const FAILED: &str = "failed.json";
-pub(super) const MESH: &str = "refined.ply";
-pub(super) const FEATURES: &str = "features.json";
 /// Hashes of the other files, for `sha256sum --check`.
 const SUMS: &str = "SHA256SUMS";
 
@@ -295,16 +293,14 @@ fn refined(
         InputNames { scan, recording },
         at_each,
     )?;
-    let [mesh, features] = [MESH, FEATURES].map(|name| claimed.path().join(name));
-    let places = OutcomePlaces {
-        mesh: &mesh,
-        unit: job.mesh_unit,
-        scan,
-        features: Some(&features),
+    let features = claimed.path().join(ResultFiles::FEATURES);
+    let files = ResultFiles {
+        mesh: claimed.path().join(ResultFiles::MESH),
+        features: Some(features.clone()),
         touches: None,
     };
-    places
-        .write(refined)
+    files
+        .write(refined, scan, job.mesh_unit)
         .map_err(|error| JobFailure::OfSystem(error.into()))?;
     let count = read_features(&features)
         .map_err(|error| JobFailure::OfSystem(error.into()))?
@@ -336,7 +332,7 @@ fn report(job: &Job, result: PathBuf, was_there: bool) -> Result<JobReport, Swee
 fn sums_of(result: &Path) -> Result<Vec<String>, FileError> {
     let names: &[&str] = match result.join(FAILED).exists() {
         true => &[FAILED, RECORD],
-        false => &[FEATURES, RECORD, MESH, SUMMARY],
+        false => &[ResultFiles::FEATURES, RECORD, ResultFiles::MESH, SUMMARY],
     };
     let line = |name: &&str| Ok(format!("{}  {name}\n", content_hash(&result.join(name))?));
     names.iter().map(line).collect()

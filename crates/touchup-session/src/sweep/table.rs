@@ -6,7 +6,8 @@ use serde_json::{Map, Value};
 
 use super::error::SweepError;
 use super::job::{Job, JobsFile};
-use super::run::{FEATURES, JobOutcome};
+use super::run::JobOutcome;
+use crate::session::ResultFiles;
 use touchup_io::features_file::read_features;
 use touchup_io::result_table::ResultTable;
 
@@ -70,7 +71,7 @@ pub fn tables_of(
         }
         tables.jobs.add_json(&row);
         if with_features && failed.is_none() {
-            for feature in read_features(&result.join(FEATURES))?.features {
+            for feature in read_features(&result.join(ResultFiles::FEATURES))?.features {
                 let mut row = Map::new();
                 row.insert("job".to_owned(), job.job.into());
                 row.insert("job_id".to_owned(), job.id.clone().into());

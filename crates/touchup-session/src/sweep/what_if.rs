@@ -8,7 +8,8 @@ use serde_json::Value;
 
 use super::error::SweepError;
 use super::record::{JobRecord, read_record};
-use super::run::{FEATURES, JobOutcome, MESH};
+use super::run::JobOutcome;
+use crate::session::ResultFiles;
 use crate::threads::Threads;
 use touchup_features::compare::{
     CompareError, DisplacedFrom, Displacement, IndexedMesh, angle_between, displacements_by_vertex,
@@ -78,11 +79,11 @@ impl JobResult {
                 why,
             });
         }
-        let path = folder.join(MESH);
+        let path = folder.join(ResultFiles::MESH);
         let MeshFile { mesh, .. } = read_mesh(&path, record.mesh_unit)?;
         let [sigma] = read_vertex_columns(&path, record.mesh_unit, &mesh, ["sigma_mm"])?;
         let sigma = sigma.map(|column| column.into_iter().map(|mm| f64::from(mm) * 1e-3).collect());
-        let features = read_features(&folder.join(FEATURES))
+        let features = read_features(&folder.join(ResultFiles::FEATURES))
             .map_err(SweepError::from)?
             .features;
         Ok(Self {
