@@ -289,7 +289,7 @@ fn what_is_told_wrong_of_it_is_refused_by_name() {
     };
     let frame = refused(|params| params.section.wrench_frame = "tool0".to_owned());
     assert!(
-        frame.contains("\"ft_sensor\"") && frame.contains("robot.wrench_frame"),
+        frame.contains("\"ft_sensor\"") && frame.contains("robot.ros2_control.wrench_frame"),
         "{frame}"
     );
     let joint = refused(|params| params.joint_names[2] = "elbow".into());

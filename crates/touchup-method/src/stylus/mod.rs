@@ -58,6 +58,8 @@ pub use tip_shape::{TipBody, TipPlace, TipShape, TipSizes};
 
 pub use crate::parameters::SettingError;
 
+use std::ops::{Add, Mul, Sub};
+
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
 
 /// Largest coordinate of a valid pose in the object frame, m.
@@ -151,10 +153,61 @@ pub struct Wrench {
 
 impl Wrench {
     /// Rotated into other axes.
-    pub(crate) fn turned(&self, rotation: &UnitQuaternion<f64>) -> Self {
+    pub fn turned(&self, rotation: &UnitQuaternion<f64>) -> Self {
         Self {
             force: rotation * self.force,
             torque: rotation * self.torque,
+        }
+    }
+
+    /// About another origin, in the same axes: τ_A = τ_B + p_AB × f.
+    ///
+    /// - `p_ab`: the present origin from the other one, m.
+    pub fn about(&self, p_ab: &Vector3<f64>) -> Self {
+        Self {
+            force: self.force,
+            torque: self.torque + p_ab.cross(&self.force),
+        }
+    }
+
+    /// In the axes of another frame about its origin: f_A = R_AB f_B, τ_A = R_AB τ_B + p_AB × f_A.
+    ///
+    /// - `pose_ab`: the present frame in the other one.
+    pub fn moved(&self, pose_ab: &Isometry3<f64>) -> Self {
+        self.turned(&pose_ab.rotation)
+            .about(&pose_ab.translation.vector)
+    }
+}
+
+impl Add for Wrench {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self {
+            force: self.force + other.force,
+            torque: self.torque + other.torque,
+        }
+    }
+}
+
+impl Sub for Wrench {
+    type Output = Self;
+
+    fn sub(self, other: Self) -> Self {
+        Self {
+            force: self.force - other.force,
+            torque: self.torque - other.torque,
+        }
+    }
+}
+
+impl Mul<f64> for Wrench {
+    type Output = Self;
+
+    fn mul(self, factor: f64) -> Self {
+        Self {
+            force: self.force * factor,
+            torque: self.torque * factor,
         }
     }
 }

@@ -26,8 +26,6 @@ const CALM: f64 = 4.0;
 const PRESS_ACCELERATION: f64 = 2.0;
 /// Deceleration without orders, and after a fault, m/s².
 const FAULT_STOP: f64 = 2.0;
-/// Maximum acceleration of a command, m/s².
-const TOP_ACCELERATION: f64 = 10.0;
 /// Acceleration of rotations, rad/s².
 const TURN_ACCELERATION: f64 = 2.0;
 /// Maximum speed of a standing tip, m/s.
@@ -105,16 +103,11 @@ impl Ros2ControlArm {
                 "nobody listens to {}: is joint_trajectory_controller active (`ros2 control list_controllers`)?",
                 params.section.trajectory_topic
             );
-            return Err(ArmError::Refused {
-                what: "to connect",
-                reason,
-            });
+            return Err(ArmError::refused("to connect", reason));
         }
         let plan = BrakePlan::rest(params.geometry.joint_count());
-        let plan = plan.ok_or(ArmError::Refused {
-            what: "to connect",
-            reason: "it has too many joints".to_owned(),
-        })?;
+        let too_many = || ArmError::refused("to connect", "it has too many joints");
+        let plan = plan.ok_or_else(too_many)?;
         let now = params.clock.now();
         Ok(Self {
             reader,
@@ -136,17 +129,12 @@ impl Ros2ControlArm {
     /// Converts a measurement to the state of the trait.
     fn seen(&self, measured: &ArmSample) -> ArmState {
         let pose_bf = self.params.geometry.flange(&measured.sample.joints);
-        let free = self.unweighed(measured);
-        let (force, torque) = (free.force - self.tare.force, free.torque - self.tare.torque);
-        // torque about the centre of the ball
-        let torque = torque - self.params.pose_ft.translation.vector.cross(&force);
+        let contact_f = self.unweighed(measured) - self.tare;
+        let p_tf = -self.params.pose_ft.translation.vector;
         ArmState {
             stamp_ns: measured.sample.stamp_ns,
             pose_bt: pose_bf * self.params.pose_ft,
-            wrench_b: Wrench {
-                force: pose_bf.rotation * force,
-                torque: pose_bf.rotation * torque,
-            },
+            wrench_b: contact_f.about(&p_tf).turned(&pose_bf.rotation),
             raw_wrench_f: measured.wrench_f,
             joints: measured.sample.joints,
             safety: Safety::Normal,
@@ -160,11 +148,8 @@ impl Ros2ControlArm {
             .geometry
             .flange(&measured.sample.joints)
             .rotation;
-        let (weight, raw) = (self.params.payload.weight_o(&r_bf), measured.wrench_f);
-        Wrench {
-            force: raw.force - r_bf.inverse() * weight.force,
-            torque: raw.torque - r_bf.inverse() * weight.torque,
-        }
+        let weight = self.params.payload.weight_o(&r_bf);
+        measured.wrench_f - weight.turned(&r_bf.inverse())
     }
 
     /// Vector from the flange to the tip, m in B.
@@ -193,25 +178,25 @@ impl Ros2ControlArm {
     fn rates_of(&self, [x, y, z, a, b, c]: [f64; 6]) -> Result<Joints, ArmError> {
         let angular = Vector3::new(a, b, c);
         let of_flange = Vector3::new(x, y, z) - angular.cross(&self.arm_of_tip());
-        let refused = |reason| ArmError::Refused {
-            what: "a velocity",
-            reason,
-        };
         let rates = self
             .params
             .geometry
             .turning(&self.last.sample.joints, &of_flange, &angular);
         let rates = rates.ok_or_else(|| {
-            refused("the arm is in a singularity: begin from another pose".to_owned())
+            let reason = "the arm is in a singularity: begin from another pose";
+            ArmError::refused("a velocity", reason)
         })?;
         let most = self.params.top_joint_speed;
         match rates.iter().position(|rate| rate.abs() > most) {
-            Some(joint) => Err(refused(format!(
-                "{} would have to turn with {:.0}°/s, and may with {:.0}: the arm is near a singularity",
-                self.params.joint_names[joint],
-                rates[joint].abs().to_degrees(),
-                most.to_degrees()
-            ))),
+            Some(joint) => {
+                let reason = format!(
+                    "{} would have to turn with {:.0}°/s, and may with {:.0}: the arm is near a singularity",
+                    self.params.joint_names[joint],
+                    rates[joint].abs().to_degrees(),
+                    most.to_degrees()
+                );
+                Err(ArmError::refused("a velocity", reason))
+            }
             None => Ok(rates),
         }
     }
@@ -346,48 +331,18 @@ impl Ros2ControlArm {
         Vector3::new(x, y, z).norm()
     }
 
-    fn check(&self, what: &'static str, speed: f64, acceleration: f64) -> Result<(), ArmError> {
-        let most = self.params.top_speed;
-        if !(0.0..=most).contains(&speed) {
-            return refuse(what, format!("{speed} m/s is not from 0 to {most} m/s"));
-        }
-        if acceleration.is_nan() || acceleration <= 0.0 || acceleration > TOP_ACCELERATION {
-            return refuse(
-                what,
-                format!("{acceleration} m/s² is not above 0 and up to {TOP_ACCELERATION} m/s²"),
-            );
-        }
-        Ok(())
-    }
-
     fn obey(&mut self, command: &Command) -> Result<(), ArmError> {
-        match *command {
-            Command::Stop { deceleration } => {
-                self.check("a stop", 0.0, deceleration)?;
-                self.stop(deceleration)
-            }
+        match command.checked(self.params.top_speed, self.params.top_force)? {
+            Command::Stop { deceleration } => self.stop(deceleration),
             Command::Velocity {
                 linear,
                 acceleration,
-            } => {
-                self.check("a velocity", linear.norm(), acceleration)?;
-                self.go_at([linear.x, linear.y, linear.z, 0.0, 0.0, 0.0], acceleration)
-            }
+            } => self.go_at([linear.x, linear.y, linear.z, 0.0, 0.0, 0.0], acceleration),
             Command::Line {
                 to,
                 speed,
                 acceleration,
             } => {
-                self.check("a line", speed, acceleration)?;
-                let is_pose = to
-                    .translation
-                    .vector
-                    .iter()
-                    .chain(to.rotation.coords.iter())
-                    .all(|part| part.is_finite());
-                if !is_pose {
-                    return refuse("a line", "its end is no pose");
-                }
                 let from = self.seen(&self.last).pose_bt;
                 let settling = SETTLING * self.params.latency;
                 self.go_at(
@@ -411,17 +366,6 @@ impl Ros2ControlArm {
         feed: Vector3<f64>,
         speed: f64,
     ) -> Result<(), ArmError> {
-        self.check("a press", feed.norm().max(speed), PRESS_ACCELERATION)?;
-        let most = self.params.top_force;
-        if !(0.0..=most).contains(&force) {
-            return refuse("a press", format!("{force} N is not from 0 to {most} N"));
-        }
-        let Some(axis) = axis
-            .try_normalize(0.5)
-            .filter(|axis| axis.iter().all(|part| part.is_finite()))
-        else {
-            return refuse("a press", "its axis is no direction");
-        };
         // dF/dt = K v: with v = (F − F_now)/(K T) the force converges with time constant T,
         // stable for T of some latencies
         let felt = -self.seen(&self.last).wrench_b.force.dot(&axis);
@@ -454,16 +398,12 @@ impl Ros2ControlArm {
             self.stop(FAULT_STOP)?;
             self.await_state()?;
             if self.speed_of(&self.last.sample) > STANDING {
-                let reason = "the arm moves: its sensor is zeroed at rest".to_owned();
-                return Err(ArmError::Refused {
-                    what: "to zero its sensor",
-                    reason,
-                });
+                let reason = "the arm moves: its sensor is zeroed at rest";
+                return Err(ArmError::refused("to zero its sensor", reason));
             }
             let free = self.unweighed(&self.last);
             let half = &mut halves[number * 2 / ZEROING];
-            half.force += free.force * (2.0 / ZEROING as f64);
-            half.torque += free.torque * (2.0 / ZEROING as f64);
+            *half = *half + free * (2.0 / ZEROING as f64);
         }
         let [first, second] = halves;
         let change = (second.force - first.force).norm();
@@ -471,15 +411,9 @@ impl Ros2ControlArm {
             let reason = format!(
                 "what it feels at rest changes by {change:.1} N: something moves the tip, or its cable"
             );
-            return Err(ArmError::Refused {
-                what: "to zero its sensor",
-                reason,
-            });
+            return Err(ArmError::refused("to zero its sensor", reason));
         }
-        self.tare = Wrench {
-            force: (first.force + second.force) * 0.5,
-            torque: (first.torque + second.torque) * 0.5,
-        };
+        self.tare = (first + second) * 0.5;
         Ok(())
     }
 }
@@ -527,13 +461,6 @@ fn lasting([x, y, z, a, b, c]: &[f64; 6], acceleration: f64) -> f64 {
     (linear / acceleration).max(angular / TURN_ACCELERATION)
 }
 
-fn refuse<T>(what: &'static str, reason: impl Into<String>) -> Result<T, ArmError> {
-    Err(ArmError::Refused {
-        what,
-        reason: reason.into(),
-    })
-}
-
 /// The last of the first states, and their period, s.
 fn rated(
     reader: &mut StateReader,
@@ -554,7 +481,7 @@ fn rated(
         let reason = format!(
             "{topic} comes with {hz:.0} Hz, and {needed:.0} Hz are needed: raise update_rate of the controller manager"
         );
-        return refuse("to connect", reason);
+        return Err(ArmError::refused("to connect", reason));
     }
     Ok((last, period))
 }

@@ -76,12 +76,7 @@ impl Default for Ros2ControlParams {
 impl Ros2ControlParams {
     /// Checks the parameters before listening.
     pub(super) fn check(&self) -> Result<(), ArmError> {
-        let refuse = |reason: String| {
-            Err(ArmError::Refused {
-                what: "its parameters",
-                reason,
-            })
-        };
+        let refuse = |reason: String| Err(ArmError::refused("its parameters", reason));
         let (joints, names) = (self.geometry.joint_count(), self.joint_names.len());
         if joints != names {
             return refuse(format!(

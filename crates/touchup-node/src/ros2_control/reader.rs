@@ -4,13 +4,13 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
 
-use nalgebra::Vector3;
-
 use super::params::Ros2ControlParams;
 use super::topic_age::TopicAge;
-use crate::ros::messages::{Header, JointState, WrenchStamped};
+use crate::ros::clock;
+use crate::ros::convert::vector_of;
+use crate::ros::messages::{JointState, WrenchStamped};
 use crate::ros::port::{ArmPort, ArmReport};
-use touchup_method::stylus::Wrench;
+use touchup_method::stylus::{StampedWrench, Wrench};
 use touchup_probing::arm::{ArmError, Joints, MOST_JOINTS};
 
 /// Maximum number of states that wait for a late caller or for their wrench; older ones drop out.
@@ -46,7 +46,7 @@ pub(super) struct StateReader {
     joints: TopicAge,
     wrench: TopicAge,
     waiting: VecDeque<JointSample>,
-    wrenches: VecDeque<(i64, Wrench)>,
+    wrenches: VecDeque<StampedWrench>,
     /// recent positions, for velocities missing in the messages
     places: VecDeque<(i64, Joints)>,
 }
@@ -144,9 +144,8 @@ impl StateReader {
             }
             ArmReport::Wrench(message) => {
                 let wrench = wrench_in_flange(&message, params)?;
-                let stamp_ns = nanoseconds(&message.header);
-                if self.wrench.see(stamp_ns, params.silent, now)? {
-                    keep(&mut self.wrenches, (stamp_ns, wrench), WRENCHES);
+                if self.wrench.see(wrench.stamp_ns, params.silent, now)? {
+                    keep(&mut self.wrenches, wrench, WRENCHES);
                 }
             }
             ArmReport::Unreadable(reason) => {
@@ -165,7 +164,7 @@ impl StateReader {
         let Some(sample) = self.waiting.front().copied() else {
             return Ok(None);
         };
-        let Some(&(newest_ns, _)) = self.wrenches.back() else {
+        let Some(newest_ns) = self.wrenches.back().map(|newest| newest.stamp_ns) else {
             return Ok(None);
         };
         let apart_ns = |stamp_ns: i64| stamp_ns.saturating_sub(sample.stamp_ns).saturating_abs();
@@ -176,8 +175,8 @@ impl StateReader {
         let nearest = self
             .wrenches
             .iter()
-            .min_by_key(|(stamp_ns, _)| apart_ns(*stamp_ns));
-        let Some(&(stamp_ns, wrench_f)) = nearest else {
+            .min_by_key(|wrench| apart_ns(wrench.stamp_ns));
+        let Some(&StampedWrench { stamp_ns, wrench }) = nearest else {
             return Ok(None);
         };
         if apart_ns(stamp_ns) > most_ns {
@@ -193,7 +192,10 @@ impl StateReader {
             });
         }
         self.waiting.pop_front();
-        Ok(Some(ArmSample { sample, wrench_f }))
+        Ok(Some(ArmSample {
+            sample,
+            wrench_f: wrench,
+        }))
     }
 
     /// The arm's joints in a message; `None` for a message with none of them, such as a gripper's.
@@ -231,7 +233,7 @@ impl StateReader {
         let joints = joints.ok_or_else(|| {
             unreadable("a position of its joints is missing or no number".to_owned())
         })?;
-        let stamp_ns = nanoseconds(&message.header);
+        let stamp_ns = clock::stamp_ns(message.header.stamp);
         let rates = of(&message.velocity).unwrap_or_else(|| self.difference(stamp_ns, &joints));
         if self
             .places
@@ -277,16 +279,11 @@ fn keep<T>(queue: &mut VecDeque<T>, item: T, most: usize) {
     queue.push_back(item);
 }
 
-fn nanoseconds(header: &Header) -> i64 {
-    i64::from(header.stamp.sec) * 1_000_000_000 + i64::from(header.stamp.nanosec)
-}
-
-/// Reading of the sensor S in the axes of the flange F about its origin: f_F = R_FS f_S, τ_F = R_FS
-/// τ_S + p_FS × f_F.
+/// Reading of the sensor in the axes of the flange F about its origin.
 fn wrench_in_flange(
     message: &WrenchStamped,
     params: &Ros2ControlParams,
-) -> Result<Wrench, ArmError> {
+) -> Result<StampedWrench, ArmError> {
     let unreadable = |reason| {
         Err(ArmError::Unreadable {
             topic: params.section.wrench_topic.clone(),
@@ -296,24 +293,20 @@ fn wrench_in_flange(
     let (named, wanted) = (&message.header.frame_id, &params.section.wrench_frame);
     if named != wanted {
         return unreadable(format!(
-            "it is in the frame {named:?}, and robot.wrench_frame of the scene is {wanted:?}: name that frame there, and its \
+            "it is in the frame {named:?}, and robot.ros2_control.wrench_frame of the scene is {wanted:?}: name that frame there, and its \
              pose in the flange"
         ));
     }
-    let (force, torque) = (&message.wrench.force, &message.wrench.torque);
-    let (force, torque) = (
-        Vector3::new(force.x, force.y, force.z),
-        Vector3::new(torque.x, torque.y, torque.z),
-    );
-    if !force
-        .iter()
-        .chain(torque.iter())
-        .all(|part| part.is_finite())
-    {
+    let wrench_s = Wrench {
+        force: vector_of(&message.wrench.force),
+        torque: vector_of(&message.wrench.torque),
+    };
+    let mut parts = wrench_s.force.iter().chain(&wrench_s.torque);
+    if !parts.all(|part| part.is_finite()) {
         return unreadable("it has a part that is no number".to_owned());
     }
-    let pose_fs = params.section.pose_fs();
-    let force = pose_fs.rotation * force;
-    let torque = pose_fs.rotation * torque + pose_fs.translation.vector.cross(&force);
-    Ok(Wrench { force, torque })
+    Ok(StampedWrench {
+        stamp_ns: clock::stamp_ns(message.header.stamp),
+        wrench: wrench_s.moved(&params.section.pose_fs()),
+    })
 }

@@ -33,8 +33,6 @@ const FORCE_SIGN: f64 = 1.0;
 const SETTLING_TIME: f64 = 60e-3;
 /// Acceleration of the feed while pressing, m/s².
 const FEED_ACCELERATION: f64 = 0.5;
-/// Maximum acceleration of a command, m/s².
-const TOP_ACCELERATION: f64 = 10.0;
 
 /// A UR arm that holds a probe.
 ///
@@ -125,7 +123,7 @@ impl UrArm {
     /// [`ArmError::Refused`] if it cannot connect.
     pub fn recovered(params: &UrParams) -> Result<Self, ArmError> {
         Self::unlock(params)?;
-        Self::connect(params).map_err(|error| refused("to recover", error.to_string()))
+        Self::connect(params).map_err(|error| ArmError::refused("to recover", error.to_string()))
     }
 
     /// Means by which the arm stopped at the last fault of its connection or client; `None`: no
@@ -206,7 +204,7 @@ impl Arm for UrArm {
         self.client
             .close("was ended for a restart, and that failed");
         *self = Self::connect(&self.params)
-            .map_err(|error| refused("to recover", error.to_string()))?;
+            .map_err(|error| ArmError::refused("to recover", error.to_string()))?;
         Ok(())
     }
 
@@ -216,13 +214,6 @@ impl Arm for UrArm {
 
     fn slowed(&self) -> Option<SpeedReduction> {
         self.last.slowed()
-    }
-}
-
-fn refused(what: &'static str, reason: impl Into<String>) -> ArmError {
-    ArmError::Refused {
-        what,
-        reason: reason.into(),
     }
 }
 
@@ -250,101 +241,57 @@ pub(super) fn order_of(
     last: &UrState,
     params: &UrParams,
 ) -> Result<OrderAction, ArmError> {
-    match *command {
+    Ok(match command.checked(params.top_speed, params.top_force)? {
         Command::Line {
             to,
             speed,
             acceleration,
-        } => {
-            check(params, "a line", speed, acceleration)?;
-            let is_pose = vector_of(&to).iter().all(|part| part.is_finite());
-            if !is_pose {
-                return Err(refused("a line", "its end is no pose"));
-            }
-            let from = pose_of(last.pose);
-            Ok(OrderAction::Move {
-                twist: velocity_towards(&from, &to, [speed, acceleration], SETTLING_TIME),
-                acceleration,
-            })
-        }
+        } => OrderAction::Move {
+            twist: velocity_towards(
+                &pose_of(last.pose),
+                &to,
+                [speed, acceleration],
+                SETTLING_TIME,
+            ),
+            acceleration,
+        },
         Command::Velocity {
             linear,
             acceleration,
-        } => {
-            check(params, "a velocity", linear.norm(), acceleration)?;
-            Ok(OrderAction::Move {
-                twist: [linear.x, linear.y, linear.z, 0.0, 0.0, 0.0],
-                acceleration,
-            })
-        }
+        } => OrderAction::Move {
+            twist: [linear.x, linear.y, linear.z, 0.0, 0.0, 0.0],
+            acceleration,
+        },
         Command::Press {
             axis,
             force,
             feed,
             speed,
         } => {
-            check(params, "a press", feed.norm().max(speed), FEED_ACCELERATION)?;
-            let most = params.top_force;
-            if !(0.0..=most).contains(&force) {
-                let reason = format!("{force} N is not from 0 to {most} N");
-                return Err(refused("a press", reason));
-            }
-            let frame =
-                frame_along(&axis).ok_or_else(|| refused("a press", "its axis is no direction"))?;
             let place = pose_of(last.pose).translation.vector;
             let across = feed - axis * feed.dot(&axis);
-            Ok(OrderAction::Press {
-                frame: vector_of(&Isometry3::from_parts(place.into(), frame)),
+            OrderAction::Press {
+                frame: vector_of(&Isometry3::from_parts(place.into(), frame_along(&axis))),
                 force_n: force,
                 speed,
                 feed: across.into(),
                 acceleration: FEED_ACCELERATION,
-            })
+            }
         }
-        Command::Stop { deceleration } => {
-            check(params, "a stop", 0.0, deceleration)?;
-            Ok(OrderAction::Stop { deceleration })
-        }
-    }
+        Command::Stop { deceleration } => OrderAction::Stop { deceleration },
+    })
 }
 
-fn check(
-    params: &UrParams,
-    what: &'static str,
-    speed: f64,
-    acceleration: f64,
-) -> Result<(), ArmError> {
-    let most = params.top_speed;
-    if !(0.0..=most).contains(&speed) {
-        return Err(refused(
-            what,
-            format!("{speed} m/s is not from 0 to {most} m/s"),
-        ));
-    }
-    if acceleration.is_nan() || acceleration <= 0.0 || acceleration > TOP_ACCELERATION {
-        return Err(refused(
-            what,
-            format!("{acceleration} m/s² is not above 0 and up to {TOP_ACCELERATION} m/s²"),
-        ));
-    }
-    Ok(())
-}
-
-/// An orientation in B with its z along the axis; `None`: the axis is no direction.
-fn frame_along(axis: &Vector3<f64>) -> Option<UnitQuaternion<f64>> {
-    let axis = axis
-        .try_normalize(0.5)
-        .filter(|axis| axis.iter().all(|part| part.is_finite()))?;
+/// An orientation in B with its z along the axis, a unit vector.
+fn frame_along(axis: &Vector3<f64>) -> UnitQuaternion<f64> {
     let aside = if axis.x.abs() < 0.7 {
         Vector3::x()
     } else {
         Vector3::y()
     };
-    let across = aside.cross(&axis).normalize();
-    let turn = nalgebra::Matrix3::from_columns(&[axis.cross(&across) * -1.0, across, axis]);
-    Some(UnitQuaternion::from_rotation_matrix(
-        &Rotation3::from_matrix_unchecked(turn),
-    ))
+    let across = aside.cross(axis).normalize();
+    let turn = nalgebra::Matrix3::from_columns(&[axis.cross(&across) * -1.0, across, *axis]);
+    UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(turn))
 }
 
 #[cfg(test)]
@@ -359,10 +306,8 @@ mod tests {
             -Vector3::y(),
             Vector3::new(0.6, 0.0, -0.8),
         ] {
-            let frame = frame_along(&axis).unwrap();
+            let frame = frame_along(&axis);
             assert!((frame * Vector3::z() - axis).norm() < 1e-12, "{axis}");
         }
-        assert!(frame_along(&Vector3::zeros()).is_none());
-        assert!(frame_along(&Vector3::new(f64::NAN, 0.0, 1.0)).is_none());
     }
 }

@@ -10,6 +10,11 @@ use nalgebra::{Isometry3, Vector3};
 use super::joints::Joints;
 use touchup_method::stylus::{StampedPose, StampedWrench, Wrench};
 
+/// Maximum acceleration of a command, m/s².
+const TOP_ACCELERATION: f64 = 10.0;
+/// Minimum length of the axis of a press, a unit vector up to rounding.
+const LEAST_AXIS: f64 = 0.5;
+
 /// State of an arm at one moment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ArmState {
@@ -35,11 +40,7 @@ impl ArmState {
     ///
     /// - `stamp_ns`: of both.
     pub fn as_probe(&self, stamp_ns: i64) -> (StampedPose, StampedWrench) {
-        let turned = |v| self.pose_bt.rotation.inverse() * v;
-        let wrench = Wrench {
-            force: turned(self.wrench_b.force),
-            torque: turned(self.wrench_b.torque),
-        };
+        let wrench = self.wrench_b.turned(&self.pose_bt.rotation.inverse());
         (
             StampedPose {
                 stamp_ns,
@@ -103,6 +104,68 @@ pub enum Command {
         /// deceleration, m/s²
         deceleration: f64,
     },
+}
+
+impl Command {
+    /// This command with a unit axis, refused if an arm may not get it.
+    ///
+    /// - `top_speed`: of the tip, m/s; `top_force`: of a press, N.
+    ///
+    /// # Errors
+    /// [`ArmError::Refused`] for a speed, acceleration, force, pose or axis out of range.
+    pub fn checked(self, top_speed: f64, top_force: f64) -> Result<Self, ArmError> {
+        let (name, speeds, acceleration) = match self {
+            Self::Line {
+                speed,
+                acceleration,
+                ..
+            } => ("a line", [speed; 2], acceleration),
+            Self::Velocity {
+                linear,
+                acceleration,
+            } => ("a velocity", [linear.norm(); 2], acceleration),
+            // the arm has its own acceleration of a press
+            Self::Press { feed, speed, .. } => ("a press", [feed.norm(), speed], TOP_ACCELERATION),
+            Self::Stop { deceleration } => ("a stop", [0.0; 2], deceleration),
+        };
+        let refused = |reason: String| Err(ArmError::refused(name, reason));
+        // NaN is in no range
+        let is_slow = |speed: &f64| (0.0..=top_speed).contains(speed);
+        if let Some(speed) = speeds.iter().find(|speed| !is_slow(speed)) {
+            return refused(format!("{speed} m/s is not from 0 to {top_speed} m/s"));
+        }
+        if acceleration == 0.0 || !(0.0..=TOP_ACCELERATION).contains(&acceleration) {
+            return refused(format!(
+                "{acceleration} m/s² is not above 0 and up to {TOP_ACCELERATION} m/s²"
+            ));
+        }
+        match self {
+            Self::Line { to, .. } if !is_finite(&to) => refused("its end is no pose".to_owned()),
+            Self::Press { force, .. } if !(0.0..=top_force).contains(&force) => {
+                refused(format!("{force} N is not from 0 to {top_force} N"))
+            }
+            Self::Press {
+                axis,
+                force,
+                feed,
+                speed,
+            } => match axis.try_normalize(LEAST_AXIS) {
+                Some(axis) if axis.iter().all(|part| part.is_finite()) => Ok(Self::Press {
+                    axis,
+                    force,
+                    feed,
+                    speed,
+                }),
+                _ => refused("its axis is no direction".to_owned()),
+            },
+            _ => Ok(self),
+        }
+    }
+}
+
+fn is_finite(pose: &Isometry3<f64>) -> bool {
+    let (place, turn) = (&pose.translation.vector, &pose.rotation.coords);
+    place.iter().chain(turn).all(|part| part.is_finite())
 }
 
 /// Causes that slow an arm below its ordered speed.
@@ -290,6 +353,16 @@ pub enum ArmError {
     },
 }
 
+impl ArmError {
+    /// [`Self::Refused`]
+    pub fn refused(what: &'static str, reason: impl Into<String>) -> Self {
+        Self::Refused {
+            what,
+            reason: reason.into(),
+        }
+    }
+}
+
 /// An arm that holds a probe.
 pub trait Arm {
     /// Waits for the next state.
@@ -330,6 +403,57 @@ pub trait Arm {
 mod tests {
     use super::*;
     use nalgebra::UnitQuaternion;
+
+    #[test]
+    fn a_command_out_of_range_is_refused_with_its_number() {
+        let (nan, z) = (f64::NAN, -Vector3::z());
+        let reason = |command: Command| match command.checked(0.25, 50.0) {
+            Err(ArmError::Refused { reason, .. }) => reason,
+            other => format!("{other:?}"),
+        };
+        let velocity = |linear, acceleration| Command::Velocity {
+            linear,
+            acceleration,
+        };
+        let press = |axis, force, feed| Command::Press {
+            axis,
+            force,
+            feed,
+            speed: 0.01,
+        };
+        let line = |to| Command::Line {
+            to,
+            speed: 0.1,
+            acceleration: 1.0,
+        };
+        let sideways = Vector3::x() * 0.01;
+        for (command, words) in [
+            (velocity(z, 1.0), "1 m/s is not from 0 to 0.25 m/s"),
+            (velocity(z * nan, 1.0), "NaN m/s is not"),
+            (velocity(z * 0.1, 0.0), "0 m/s² is not above 0"),
+            (velocity(z * 0.1, 11.0), "11 m/s² is not"),
+            (velocity(z * 0.1, nan), "NaN m/s² is not"),
+            (Command::Stop { deceleration: -1.0 }, "-1 m/s² is not"),
+            (line(Isometry3::translation(nan, 0.0, 0.0)), "its end is no"),
+            (press(z, 51.0, sideways), "51 N is not from 0 to 50 N"),
+            (press(z, 5.0, z), "1 m/s is not"),
+            (press(z, 5.0, sideways * nan), "NaN m/s is not"),
+            (press(z * 0.0, 5.0, sideways), "its axis is no direction"),
+            (press(z * nan, 5.0, sideways), "its axis is no direction"),
+        ] {
+            assert!(reason(command).starts_with(words), "{}", reason(command));
+        }
+        for good in [
+            line(Isometry3::identity()),
+            velocity(z * 0.25, 10.0),
+            press(z, 50.0, sideways),
+            Command::Stop { deceleration: 10.0 },
+        ] {
+            assert_eq!(good.checked(0.25, 50.0), Ok(good));
+        }
+        let long = press(z * 2.0, 5.0, sideways).checked(0.25, 50.0);
+        assert_eq!(long, Ok(press(z, 5.0, sideways)));
+    }
 
     /// After a quarter turn about z, x of the base is −y of the probe.
     #[test]

@@ -1,6 +1,6 @@
 //! Dry run: touches and paths by the current mesh, checked, without motion of the arm.
 
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::{Isometry3, Point3};
 
 use super::cell::RobotCell;
 use super::ending::Ending;
@@ -57,16 +57,11 @@ impl RobotCell {
         let joints = self
             .geometry
             .most_dexterous(&(pose_bt * self.pose_ft.inverse()))?;
-        let nothing = Wrench {
-            force: Vector3::zeros(),
-            torque: Vector3::zeros(),
-        };
-        let (wrench_b, raw_wrench_f) = (nothing, nothing);
         Some(ArmState {
             stamp_ns: 0,
             pose_bt: *pose_bt,
-            wrench_b,
-            raw_wrench_f,
+            wrench_b: Wrench::default(),
+            raw_wrench_f: Wrench::default(),
             joints,
             safety: Safety::Normal,
         })
