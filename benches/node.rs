@@ -31,6 +31,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use touchup::clock::Clock;
 use touchup::io::mesh_file::{MeshUnit, write_mesh};
+use touchup::io::recording::LiveMessage;
 use touchup::live::Quantiles;
 use touchup::node::{INBOX, Node, PreparedNode, SessionReport};
 use touchup::ros::arguments::NodeConfig;
@@ -44,7 +45,7 @@ use touchup::ros::parameters::{ParameterValue, Parameters};
 use touchup::ros::port::{Arrival, Publication};
 use touchup::ros::{dds, in_process};
 use touchup::sim::wavy::{RADIUS, slide, wavy_plate};
-use touchup::stylus::Sample;
+use touchup::stylus::{Message, Sample, StampedPose, StampedWrench};
 
 /// Width of the raster, m: 2.3 minutes each time, so that a soak comes to the same places again and
 /// again.
@@ -172,10 +173,23 @@ fn slid_over(node: Node, world: &OtherParticipants) -> SessionReport {
     let begun = Instant::now();
     for i in 0..1000 * SECONDS {
         sleep(Duration::from_millis(i as u64).saturating_sub(begun.elapsed()));
-        let (wrench, pose) = messages(&slide(i, WIDTH));
-        // what finds no room is in the report
-        let _ = world.arrive(Arrival::Wrench(wrench, Instant::now()));
-        let _ = world.arrive(Arrival::Pose(pose, Instant::now()));
+        let Sample {
+            stamp_ns,
+            pose_ot,
+            wrench,
+        } = slide(i, WIDTH);
+        for (frame, message) in [
+            (
+                "stylus",
+                Message::Wrench(StampedWrench { stamp_ns, wrench }),
+            ),
+            ("object", Message::Pose(StampedPose { stamp_ns, pose_ot })),
+        ] {
+            let frame = frame.to_owned();
+            let arrival = Arrival::Message(LiveMessage { frame, message }, Instant::now());
+            // what finds no room is in the report
+            let _ = world.arrive(arrival);
+        }
         if i % 20 == 0 {
             published += world.published().len();
         }
@@ -348,9 +362,9 @@ fn echo(domain: u16, folder: &Path) {
     });
     while let Some(arrival) = arrivals.recv() {
         match arrival {
-            Arrival::Wrench(WrenchStamped { header, .. }, _) => {
+            Arrival::Message(of, _) if matches!(of.message, Message::Wrench(_)) => {
                 port.publish(Publication::Mismatch(HapticMismatch {
-                    header,
+                    header: header(of.message.stamp_ns(), &of.frame),
                     ..HapticMismatch::default()
                 }));
             }

@@ -8,15 +8,18 @@ use std::io::{Write, stdin, stdout};
 use std::thread;
 
 use touchup::clock::Clock;
+use touchup::io::recording::LiveMessage;
 use touchup::ros::arguments::{NodeConfig, split};
+use touchup::ros::clock::time;
 use touchup::ros::dds;
 use touchup::ros::inbox::inbox;
 use touchup::ros::messages::{
-    ColorRGBA, DetectFeaturesResponse, Feature, FeatureArray, HapticMismatch, Marker, Point,
-    ProbeFeatureResponse, ProbeFeedback, ProbeResponse, ProbeResult, ProbeTouch, UndoResponse,
-    Vector3,
+    ColorRGBA, DetectFeaturesResponse, Feature, FeatureArray, HapticMismatch, Header, Marker,
+    Point, ProbeFeatureResponse, ProbeFeedback, ProbeResponse, ProbeResult, ProbeTouch,
+    UndoResponse, Vector3,
 };
 use touchup::ros::port::{ArmOrder, Arrival, Call, GoalEnd, Publication};
+use touchup::stylus::Message;
 use tracing_subscriber::filter::{LevelFilter, Targets};
 use tracing_subscriber::layer::SubscriberExt;
 use tracing_subscriber::util::SubscriberInitExt;
@@ -106,11 +109,27 @@ fn main() -> anyhow::Result<()> {
     println!("ready");
     while let Some(arrival) = arrivals.recv() {
         match arrival {
-            Arrival::Wrench(wrench, _) => port.publish(Publication::Mismatch(HapticMismatch {
-                actual_force: wrench.wrench.force,
-                header: wrench.header,
-                ..HapticMismatch::default()
-            })),
+            Arrival::Message(
+                LiveMessage {
+                    frame,
+                    message: Message::Wrench(measured),
+                },
+                _,
+            ) => {
+                let force = measured.wrench.force;
+                port.publish(Publication::Mismatch(HapticMismatch {
+                    header: Header {
+                        stamp: time(measured.stamp_ns),
+                        frame_id: frame,
+                    },
+                    actual_force: Vector3 {
+                        x: force.x,
+                        y: force.y,
+                        z: force.z,
+                    },
+                    ..HapticMismatch::default()
+                }));
+            }
             Arrival::Call(Call::Undo(request, reply)) => {
                 // as long as it is asked for: in the enhanced mapping it is cut where it fits into
                 // no packet

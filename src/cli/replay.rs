@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use super::common::progress::WorkProgress;
 use super::{CliError, Losses, counted, notify, print_report};
-use touchup_io::recording::StampSource;
+use touchup_io::recording::{LiveMessage, StampSource};
 use touchup_method::stylus::MarkerFilter;
 use touchup_method::stylus::{Message, SyncParams};
 use touchup_node::ros;
@@ -19,7 +19,6 @@ use touchup_node::ros::parameters::CELL_FRAME;
 use touchup_node::ros::parameters::ParameterValue;
 use touchup_node::ros::playback::{PlayedTime, wrench_frame_id};
 use touchup_node::ros::port::SamplePort;
-use touchup_node::ros::{as_pose, as_wrench};
 use touchup_session::replay::{RecordedAs, Recording, ReplaySummary, each_message};
 use touchup_session::scene::Scene;
 
@@ -135,17 +134,13 @@ pub(super) fn play(
     );
     let mut publish = |message: Message| {
         pace.wait_for(message.stamp_ns());
-        let is_sent = match &message {
-            Message::Wrench(wrench) => {
-                played.wrenches += 1;
-                port.publish_wrench(as_wrench(wrench, &wrench_frame))
-            }
-            Message::Pose(pose) => {
-                played.poses += 1;
-                port.publish_pose(as_pose(pose, CELL_FRAME))
-            }
+        let (count, frame) = match &message {
+            Message::Wrench(_) => (&mut played.wrenches, &*wrench_frame),
+            Message::Pose(_) => (&mut played.poses, CELL_FRAME),
         };
-        played.unsent += u64::from(!is_sent);
+        *count += 1;
+        let frame = frame.to_owned();
+        played.unsent += u64::from(!port.publish(LiveMessage { frame, message }));
     };
     let mut order = StampOrder::default();
     let mut progress = WorkProgress::new("replay", recording.message_count());

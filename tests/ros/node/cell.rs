@@ -9,6 +9,7 @@ use nalgebra::Isometry3;
 use tempfile::TempDir;
 use touchup::clock::{Clock, ManualClock};
 use touchup::io::mesh_file::{MeshUnit, write_mesh};
+use touchup::io::recording::LiveMessage;
 use touchup::node::{ArmKind, ArmOfNode, Node, NodeEnd, PreparedNode};
 use touchup::probing::arm::{Arm, ArmError, ArmState, Command};
 use touchup::ros::in_process::{OtherParticipants, start};
@@ -230,12 +231,9 @@ pub struct Lossy {
 }
 
 impl SamplePort for Lossy {
-    fn publish_wrench(&self, wrench: touchup::ros::messages::WrenchStamped) -> bool {
-        self.world.arrive(Arrival::Wrench(wrench, self.clock.now()))
-    }
-
-    fn publish_pose(&self, pose: touchup::ros::messages::PoseStamped) -> bool {
-        self.world.arrive(Arrival::Pose(pose, self.clock.now()))
+    fn publish(&self, message: LiveMessage) -> bool {
+        let now = self.clock.now();
+        self.world.arrive(Arrival::Message(message, now))
     }
 
     fn listeners(&mut self) -> [usize; 2] {

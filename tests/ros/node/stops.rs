@@ -9,20 +9,20 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use nalgebra::Vector3;
+use nalgebra::{Isometry3, Vector3};
 use touchup::clock::Clock;
 use touchup::mesh::TriMesh;
 use touchup::node::{ArmKind, ArmOfNode};
 use touchup::probing::arm::{Arm, ArmError, ArmState, Command};
 use touchup::ros::in_process::OtherParticipants;
-use touchup::ros::messages::{
-    Feature, PoseStamped, ProbeResponse, ProbeResult, ProbeSettings, UndoRequest,
-};
+use touchup::ros::messages::{Feature, ProbeResponse, ProbeResult, ProbeSettings, UndoRequest};
 use touchup::ros::parameters::ParameterValue;
 use touchup::ros::port::{Arrival, Call, GoalEnd, Reply};
 use touchup::sim::ArmParams;
+use touchup::stylus::{Message, StampedPose};
 
 use super::cell::{Cell, HUNG, Lossy, SimulatedArm};
+use super::samples::bench::in_frame;
 
 /// States over which the speed is measured.
 const SPAN: usize = 10;
@@ -193,7 +193,12 @@ fn block(world: &OtherParticipants, clock: &Clock) -> SyncSender<()> {
     });
     assert!(world.arrive_patiently(Arrival::Call(Call::Undo(UndoRequest { strokes: 1 }, busy))));
     entered.recv().unwrap();
-    while world.arrive(Arrival::Pose(PoseStamped::default(), clock.now())) {}
+    let pose = StampedPose {
+        stamp_ns: 0,
+        pose_ot: Isometry3::identity(),
+    };
+    let pose = in_frame(&Message::Pose(pose), "");
+    while world.arrive(Arrival::Message(pose.clone(), clock.now())) {}
     release
 }
 

@@ -10,7 +10,7 @@ use touchup::ros::messages::{
 use touchup::ros::port::Call;
 use touchup::stylus::Message;
 
-use super::samples::bench::{Bench, Plate, pose, read, refine};
+use super::samples::bench::{Bench, Plate, read, refine};
 
 const FILES: [&str; 3] = ["refined.ply", "features.json", "touches.csv"];
 
@@ -19,9 +19,16 @@ fn near(plate: &Plate, share: f64) -> TakeOutTouchRequest {
     let from = (plate.messages.len() as f64 * share) as usize;
     let there = plate.messages[from..]
         .iter()
-        .find(|message| matches!(message, Message::Pose(_)))
+        .find_map(|message| match message {
+            Message::Pose(pose) => Some(pose.pose_ot.translation),
+            Message::Wrench(_) => None,
+        })
         .unwrap();
-    let point = pose(there, "object").pose.position;
+    let point = Point {
+        x: there.x,
+        y: there.y,
+        z: there.z,
+    };
     let header = Header {
         frame_id: "object".to_owned(),
         ..Header::default()

@@ -9,7 +9,7 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use touchup::io::mesh_file::{MeshUnit, read_mesh, write_mesh};
 use touchup::mesh::TriMesh;
-use touchup::ros::messages::{DiagnosticStatus, Marker, ResyncMeshRequest, SaveMeshRequest, Time};
+use touchup::ros::messages::{DiagnosticStatus, Marker, ResyncMeshRequest, SaveMeshRequest};
 use touchup::ros::port::{Arrival, Call, Endpoint, Publication};
 use touchup::stylus::Message;
 
@@ -25,27 +25,26 @@ fn is_pose(message: &Message) -> bool {
 
 /// The same arrival with another stamp.
 fn stamped(mut arrival: Arrival, stamp_ns: i64) -> Arrival {
-    let header = match &mut arrival {
-        Arrival::Pose(pose, _) => &mut pose.header,
-        Arrival::Wrench(wrench, _) => &mut wrench.header,
-        _ => panic!("neither pose nor wrench"),
-    };
-    let (sec, nanosec) = (
-        stamp_ns.div_euclid(SECOND) as i32,
-        stamp_ns.rem_euclid(SECOND) as u32,
-    );
-    header.stamp = Time { sec, nanosec };
+    match message_in(&mut arrival) {
+        Message::Pose(pose) => pose.stamp_ns = stamp_ns,
+        Message::Wrench(wrench) => wrench.stamp_ns = stamp_ns,
+    }
     arrival
+}
+
+fn message_in(arrival: &mut Arrival) -> &mut Message {
+    match arrival {
+        Arrival::Message(of, _) => &mut of.message,
+        _ => panic!("neither pose nor wrench"),
+    }
 }
 
 /// What becomes of a message on its way to the node.
 type Fault = fn(&Bench, &Message) -> Arrival;
 
 fn empty_frame(mut arrival: Arrival) -> Arrival {
-    match &mut arrival {
-        Arrival::Pose(pose, _) => pose.header.frame_id.clear(),
-        Arrival::Wrench(wrench, _) => wrench.header.frame_id.clear(),
-        _ => {}
+    if let Arrival::Message(of, _) = &mut arrival {
+        of.frame.clear();
     }
     arrival
 }
@@ -102,8 +101,8 @@ const FAULTS: [(&str, Fault, &[&str]); 10] = [
         "NaN poses",
         |bench, m| {
             let mut arrival = bench.arrival(m);
-            if let Arrival::Pose(pose, _) = &mut arrival {
-                pose.pose.position.y = f64::NAN;
+            if let Message::Pose(pose) = message_in(&mut arrival) {
+                pose.pose_ot.translation.y = f64::NAN;
             }
             arrival
         },
@@ -113,7 +112,7 @@ const FAULTS: [(&str, Fault, &[&str]); 10] = [
         "NaN forces",
         |bench, m| {
             let mut arrival = bench.arrival(m);
-            if let Arrival::Wrench(wrench, _) = &mut arrival {
+            if let Message::Wrench(wrench) = message_in(&mut arrival) {
                 wrench.wrench.force.x = f64::NAN;
             }
             arrival
@@ -195,9 +194,8 @@ fn an_input_that_is_surely_wrong_is_an_error_with_its_cause() {
         let mut bench = Bench::start(&plate);
         bench.play_as(&plate.messages, |message| {
             let mut arrival = bench.arrival(message);
-            if let Arrival::Wrench(wrench, _) = &mut arrival {
-                let force = &mut wrench.wrench.force;
-                (force.x, force.y, force.z) = (sign * force.x, sign * force.y, sign * force.z);
+            if let Message::Wrench(wrench) = message_in(&mut arrival) {
+                wrench.wrench.force *= sign;
             }
             vec![arrival]
         });

@@ -140,18 +140,20 @@ impl Intake {
                 Ok(Some(stamped(record)))
             }
             MessageContent::State(state) => {
-                let pose = (raw.kind != TopicKind::Wrench).then_some(state.pose);
-                let wrench = (raw.kind != TopicKind::Pose).then_some(state.wrench);
-                if pose.is_some() {
-                    in_one_frame(&mut self.pose_frame, &state.pose_frame)?;
+                let [pose, wrench] = *state;
+                if raw.kind != TopicKind::Wrench {
+                    in_one_frame(&mut self.pose_frame, &pose.frame)?;
                 }
-                if wrench.is_some() {
-                    in_one_frame(&mut self.wrench_frame, &state.wrench_frame)?;
+                if raw.kind != TopicKind::Pose {
+                    in_one_frame(&mut self.wrench_frame, &wrench.frame)?;
                 }
-                let wrench = wrench.map(|wrench| stamped(Message::Wrench(wrench).into()));
-                let Some(pose) = pose else { return Ok(wrench) };
-                self.others.extend(wrench);
-                Ok(Some(stamped(Message::Pose(pose).into())))
+                let [pose, wrench] = [pose, wrench].map(|one| stamped(one.message.into()));
+                match raw.kind {
+                    TopicKind::Wrench => return Ok(Some(wrench)),
+                    TopicKind::Pose => {}
+                    _ => self.others.push_back(wrench),
+                }
+                Ok(Some(pose))
             }
             MessageContent::Transforms(links) => {
                 let Some(chain) = &mut self.chain else {

@@ -2,6 +2,15 @@
 
 use touchup_method::stylus::{MarkerFrame, Message};
 
+/// A pose or a wrench, and the frame in its header; empty without one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LiveMessage {
+    /// of the pose, or of the wrench's axes
+    pub frame: String,
+    /// stamp of its header, or else time of reception
+    pub message: Message,
+}
+
 /// One entry of a recording.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Record {

@@ -21,12 +21,13 @@ use super::setup::Setup;
 use super::side_work::SideWork;
 use super::take_out::TakingOut;
 use super::variances::VarianceWork;
-use crate::ros::convert::{as_pose, frame_transform, stamp_ns};
+use crate::ros::convert::frame_transform;
 use crate::ros::inbox::Arrivals;
 use crate::ros::mesh_feed::Edits;
-use crate::ros::messages::{PoseStamped, TFMessage, WrenchStamped};
+use crate::ros::messages::TFMessage;
 use crate::ros::port::{Arrival, Endpoint, Port};
 use crate::ros::stop::StopState;
+use touchup_io::recording::LiveMessage;
 use touchup_method::stylus::{
     FrameError, FrameTransform, Message, MovingFrame, Sample, WrenchFrame,
 };
@@ -52,25 +53,6 @@ const SETTLES_AFTER: Duration = Duration::from_millis(500);
 /// Maximum number of messages of a stream that wait for a transform.
 const MOST_WAITING: usize = 4096;
 
-/// A message of either stream.
-#[derive(Debug)]
-enum ArrivedMessage {
-    Pose(PoseStamped),
-    Wrench(WrenchStamped),
-}
-
-impl ArrivedMessage {
-    fn stream(&self) -> usize {
-        usize::from(matches!(self, Self::Wrench(_)))
-    }
-
-    fn stamp_ns(&self) -> Option<i64> {
-        let (Self::Pose(PoseStamped { header, .. }) | Self::Wrench(WrenchStamped { header, .. })) =
-            self;
-        stamp_ns(&header.stamp)
-    }
-}
-
 /// State of the sample thread.
 pub struct RefinementWorker {
     pub(super) setup: Arc<Setup>,
@@ -87,7 +69,7 @@ pub struct RefinementWorker {
     pub(super) moving: Option<MovingFrame>,
     pub(super) session: NodeSession,
     /// poses and wrenches waiting for a transform, and their arrival
-    waiting: [VecDeque<(ArrivedMessage, Instant)>; 2],
+    waiting: [VecDeque<(LiveMessage, Instant)>; 2],
     pub(super) streams: [StreamWatch; 2],
     pub(super) acceptance: Acceptance,
     pub(super) doubts: InputDoubts,
@@ -208,8 +190,7 @@ impl RefinementWorker {
 
     fn take(&mut self, arrival: Arrival) -> ControlFlow<()> {
         match arrival {
-            Arrival::Wrench(wrench, at) => self.message(ArrivedMessage::Wrench(wrench), at),
-            Arrival::Pose(pose, at) => self.message(ArrivedMessage::Pose(pose), at),
+            Arrival::Message(message, at) => self.message(message, at),
             Arrival::Tf(transforms) => self.transforms(&transforms, false),
             Arrival::TfStatic(transforms) => self.transforms(&transforms, true),
             Arrival::ClickedPoint(clicked) => self.flag_clicked(&clicked),
@@ -263,22 +244,26 @@ impl RefinementWorker {
         let refused = refused + (message.transforms.len() - links.len()) as u64;
         (0..refused).for_each(|_| self.session.counters.refuse("bad_transform"));
         while let Some(pose) = self.next_moving_pose() {
-            self.message(ArrivedMessage::Pose(pose), self.setup.clock.now());
+            self.message(pose, self.setup.clock.now());
         }
         self.retry_waiting();
     }
 
     /// The next pose from the transforms.
-    fn next_moving_pose(&mut self) -> Option<PoseStamped> {
+    fn next_moving_pose(&mut self) -> Option<LiveMessage> {
         let moving = self.moving.as_mut()?;
         let pose = moving.next_pose(&self.resolver.frames);
         (0..moving.take_apart()).for_each(|_| self.session.counters.refuse("transforms_apart"));
-        pose.map(|pose| as_pose(&pose, moving.base()))
+        pose.map(|pose| LiveMessage {
+            frame: moving.base().to_owned(),
+            message: Message::Pose(pose),
+        })
     }
 
-    fn message(&mut self, message: ArrivedMessage, at: Instant) {
-        let stream = message.stream();
-        self.streams[stream].arrive(self.setup.clock.now(), message.stamp_ns(), at);
+    fn message(&mut self, message: LiveMessage, at: Instant) {
+        let stream = stream_of(&message.message);
+        let stamp_ns = Some(message.message.stamp_ns()).filter(|stamp_ns| *stamp_ns >= 0);
+        self.streams[stream].arrive(self.setup.clock.now(), stamp_ns, at);
         if self.stops.is_paused() || self.fault.is_some() {
             self.session.counters.paused += 1;
             return;
@@ -322,13 +307,9 @@ impl RefinementWorker {
     }
 
     /// Transforms a message and passes it on; returns it if a transform is still missing.
-    fn place(&mut self, message: ArrivedMessage, at: Instant) -> Option<ArrivedMessage> {
-        let placed = match &message {
-            ArrivedMessage::Pose(pose) => self.resolver.pose(pose),
-            ArrivedMessage::Wrench(wrench) => self.resolver.wrench(wrench),
-        };
-        match placed {
-            Ok(placed) => self.pair(placed, message.stream(), at),
+    fn place(&mut self, message: LiveMessage, at: Instant) -> Option<LiveMessage> {
+        match self.resolver.recorded(&message) {
+            Ok(recorded) => self.pair(recorded, at),
             Err(Refusal::Frame(FrameError::NotYet(..))) => return Some(message),
             Err(refusal) => {
                 self.session.counters.refuse(refusal.name());
@@ -342,7 +323,8 @@ impl RefinementWorker {
 
     /// Passes a transformed message to the synchroniser and the recording, and complete samples to
     /// the refiner.
-    fn pair(&mut self, message: Message, stream: usize, at: Instant) {
+    fn pair(&mut self, message: Message, at: Instant) {
+        let stream = stream_of(&message);
         // the first wrench shows object axes: without any push yet, everything starts again
         if self.resolver.axes == Some(WrenchFrame::Object)
             && self.session.axes == WrenchFrame::Sensor
@@ -498,6 +480,11 @@ impl RefinementWorker {
         self.edits.iter_mut().for_each(|edits| edits.clear());
         std::mem::replace(&mut self.session, next)
     }
+}
+
+/// Index of the stream: poses, wrenches.
+fn stream_of(message: &Message) -> usize {
+    usize::from(matches!(message, Message::Wrench(_)))
 }
 
 fn shifted(mut message: Message, shift_ns: i64) -> Message {

@@ -3,8 +3,9 @@
 use std::time::Instant;
 
 use crate::ros::inbox::Inbox;
-use crate::ros::messages::{PoseStamped, WrenchStamped};
 use crate::ros::port::{Arrival, SamplePort};
+use touchup_io::recording::LiveMessage;
+use touchup_method::stylus::Message;
 
 /// Passes the measurements of an arm to its node within the process, and publishes them for others:
 /// with an arm the node does not subscribe to these topics.
@@ -18,17 +19,12 @@ pub struct ArmSamples {
 }
 
 impl SamplePort for ArmSamples {
-    fn publish_wrench(&self, wrench: WrenchStamped) -> bool {
-        self.inbox
-            .put(Arrival::Wrench(wrench.clone(), Instant::now()));
-        self.topics.publish_wrench(wrench)
-    }
-
-    fn publish_pose(&self, pose: PoseStamped) -> bool {
-        if self.has_poses {
-            self.inbox.put(Arrival::Pose(pose.clone(), Instant::now()));
+    fn publish(&self, message: LiveMessage) -> bool {
+        if self.has_poses || matches!(message.message, Message::Wrench(_)) {
+            let arrival = Arrival::Message(message.clone(), Instant::now());
+            self.inbox.put(arrival);
         }
-        self.topics.publish_pose(pose)
+        self.topics.publish(message)
     }
 
     fn listeners(&mut self) -> [usize; 2] {
@@ -41,13 +37,33 @@ mod tests {
     use super::*;
     use crate::ros::in_process::start;
     use crate::ros::inbox::{Arrivals, inbox};
+    use nalgebra::Isometry3;
+    use touchup_method::stylus::{StampedPose, StampedWrench, Wrench};
     use touchup_session::clock::Clock;
+
+    fn pose() -> LiveMessage {
+        let (stamp_ns, pose_ot) = (0, Isometry3::identity());
+        LiveMessage {
+            frame: String::new(),
+            message: Message::Pose(StampedPose { stamp_ns, pose_ot }),
+        }
+    }
+
+    fn wrench() -> LiveMessage {
+        let (stamp_ns, wrench) = (0, Wrench::default());
+        LiveMessage {
+            frame: String::new(),
+            message: Message::Wrench(StampedWrench { stamp_ns, wrench }),
+        }
+    }
 
     /// Names of the arrivals, `+` for a wrench and `-` for a pose.
     fn names(arrivals: &Arrivals) -> String {
         let name = |arrival| match arrival {
-            Arrival::Wrench(..) => '+',
-            Arrival::Pose(..) => '-',
+            Arrival::Message(LiveMessage { message, .. }, _) => match message {
+                Message::Wrench(_) => '+',
+                Message::Pose(_) => '-',
+            },
             other => panic!("{other:?}"),
         };
         std::iter::from_fn(|| arrivals.try_recv().ok())
@@ -67,8 +83,7 @@ mod tests {
             topics: Box::new(world),
         };
         for _ in 0..2 {
-            assert!(samples.publish_pose(PoseStamped::default()));
-            assert!(samples.publish_wrench(WrenchStamped::default()));
+            assert!(samples.publish(pose()) && samples.publish(wrench()));
         }
         assert_eq!(
             (names(&arrivals), names(&heard)),
@@ -77,8 +92,7 @@ mod tests {
         assert_eq!((own.dropped(), samples.listeners()), ([2, 0], [1, 1]));
         // poses of `/tf` do not mix with those of the arm
         samples.has_poses = false;
-        assert!(samples.publish_pose(PoseStamped::default()));
-        assert!(samples.publish_wrench(WrenchStamped::default()));
+        assert!(samples.publish(pose()) && samples.publish(wrench()));
         assert_eq!((names(&arrivals), names(&heard)), ("+".into(), "-+".into()));
     }
 }

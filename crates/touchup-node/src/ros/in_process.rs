@@ -8,9 +8,9 @@ use std::time::Instant;
 
 use crate::ros::inbox::Inbox;
 use crate::ros::locked;
-use crate::ros::messages::{PoseStamped, WrenchStamped};
 use crate::ros::port::{Arrival, Call, Port, Publication, Reply, SamplePort};
 use crate::ros::stop::StopState;
+use touchup_io::recording::LiveMessage;
 use touchup_session::clock::Clock;
 
 /// Maximum number of publications kept for reading; the oldest go first.
@@ -153,12 +153,8 @@ impl OtherParticipants {
 
 /// Measurements of an arm arrive as soon as the node has room.
 impl SamplePort for OtherParticipants {
-    fn publish_wrench(&self, wrench: WrenchStamped) -> bool {
-        self.arrive_patiently(Arrival::Wrench(wrench, self.port.clock.now()))
-    }
-
-    fn publish_pose(&self, pose: PoseStamped) -> bool {
-        self.arrive_patiently(Arrival::Pose(pose, self.port.clock.now()))
+    fn publish(&self, message: LiveMessage) -> bool {
+        self.arrive_patiently(Arrival::Message(message, self.port.clock.now()))
     }
 
     fn listeners(&mut self) -> [usize; 2] {
@@ -170,7 +166,8 @@ impl SamplePort for OtherParticipants {
 mod tests {
     use super::*;
     use crate::ros::inbox::inbox;
-    use crate::ros::messages::{Clock as ClockMessage, UndoRequest, UndoResponse, WrenchStamped};
+    use crate::ros::messages::{Clock as ClockMessage, UndoRequest, UndoResponse};
+    use touchup_method::stylus::{Message, StampedWrench, Wrench};
 
     #[test]
     fn a_call_is_answered_by_who_reads_the_inbox() {
@@ -193,9 +190,14 @@ mod tests {
     fn what_finds_no_room_is_counted_by_kind() {
         let (inbox, _arrivals) = inbox(1, &Clock::system());
         let (port, world) = start(inbox, &Clock::system());
+        let (stamp_ns, wrench) = (0, Wrench::default());
+        let message = LiveMessage {
+            frame: String::new(),
+            message: Message::Wrench(StampedWrench { stamp_ns, wrench }),
+        };
         let now = Instant::now();
-        assert!(world.arrive(Arrival::Wrench(WrenchStamped::default(), now)));
-        assert!(!world.arrive(Arrival::Wrench(WrenchStamped::default(), now)));
+        assert!(world.arrive(Arrival::Message(message.clone(), now)));
+        assert!(!world.arrive(Arrival::Message(message, now)));
         assert!(!world.arrive(Arrival::Clock(ClockMessage::default())));
         assert!(!world.arrive(Arrival::Clock(ClockMessage::default())));
         assert_eq!(port.dropped(), [1, 2]);

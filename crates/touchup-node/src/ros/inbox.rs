@@ -150,7 +150,7 @@ impl Inbox {
         if is_closed {
             arrival.refuse(ProbeResult::SHUTDOWN, ENDED);
         } else if kind == Some(0) {
-            let which = usize::from(!matches!(arrival, Arrival::Wrench(..) | Arrival::Pose(..)));
+            let which = usize::from(!matches!(arrival, Arrival::Message(..)));
             shared.dropped[which].fetch_add(1, Ordering::Relaxed);
         } else {
             arrival.refuse(ProbeResult::ARM_NOT_READY, FULL);
@@ -273,15 +273,22 @@ impl Drop for Arrivals {
 mod tests {
     use std::time::Instant;
 
+    use nalgebra::Isometry3;
+    use touchup_io::recording::LiveMessage;
+    use touchup_method::stylus::{Message, StampedPose};
+
     use super::*;
-    use crate::ros::messages::{
-        PoseStamped, ProbeFeatureRequest, ProbeGoal, TFMessage, TriggerResponse,
-    };
+    use crate::ros::messages::{ProbeFeatureRequest, ProbeGoal, TFMessage, TriggerResponse};
     use crate::ros::parameters::ParameterValue;
     use crate::ros::port::{Feedback, Goal, Reply};
 
     fn pose() -> Arrival {
-        Arrival::Pose(PoseStamped::default(), Instant::now())
+        let (stamp_ns, pose_ot) = (0, Isometry3::identity());
+        let message = LiveMessage {
+            frame: String::new(),
+            message: Message::Pose(StampedPose { stamp_ns, pose_ot }),
+        };
+        Arrival::Message(message, Instant::now())
     }
 
     /// A reply, and the receiver of its answer.
@@ -303,7 +310,7 @@ mod tests {
             ParameterValue::Double(7.0),
             reply().0
         )));
-        assert!(matches!(arrivals.recv(), Some(Arrival::Pose(..))));
+        assert!(matches!(arrivals.recv(), Some(Arrival::Message(..))));
         assert!(inbox.put(pose()), "there is room again");
         assert!(matches!(
             arrivals.recv(),
@@ -311,7 +318,7 @@ mod tests {
         ));
         assert!(matches!(arrivals.recv(), Some(Arrival::SetParameter(..))));
         assert!(
-            matches!(arrivals.try_recv(), Ok(Arrival::Pose(..))) && arrivals.try_recv().is_err()
+            matches!(arrivals.try_recv(), Ok(Arrival::Message(..))) && arrivals.try_recv().is_err()
         );
     }
 

@@ -28,7 +28,6 @@ pub mod stop;
 mod topics;
 
 pub use arm_samples::ArmSamples;
-pub use convert::{as_pose, as_wrench};
 #[cfg(all(feature = "ros", any(not(feature = "r2r"), feature = "r2r-check")))]
 pub use dds::{arm_port, samples, start};
 pub use exchange::RosError;

@@ -10,6 +10,7 @@ use std::time::Instant;
 
 use crate::ros::messages::*;
 use crate::ros::parameters::ParameterValue;
+use touchup_io::recording::LiveMessage;
 use touchup_method::reconstruct::Patcher;
 
 /// Number of latest tiles that a port keeps for late joiners, and maximum number in flight: 4 MB.
@@ -21,10 +22,8 @@ pub const MESH_PATCH_TOPIC: &str = "mesh_patch";
 /// An arrival.
 #[derive(Debug)]
 pub enum Arrival {
-    /// `SOURCE/wrench`, and its arrival
-    Wrench(WrenchStamped, Instant),
-    /// `SOURCE/pose`, and its arrival
-    Pose(PoseStamped, Instant),
+    /// `SOURCE/wrench` or `SOURCE/pose`, and its arrival
+    Message(LiveMessage, Instant),
     /// `/tf`
     Tf(TFMessage),
     /// `/tf_static`
@@ -228,11 +227,8 @@ pub trait Port: Send + Sync {
 
 /// Publisher of the measurements of a stylus or a probe: for stand-ins of one.
 pub trait SamplePort: Send {
-    /// Publishes on `SOURCE/wrench`, best effort; returns whether it was sent.
-    fn publish_wrench(&self, wrench: WrenchStamped) -> bool;
-
-    /// Publishes on `SOURCE/pose`, best effort; returns whether it was sent.
-    fn publish_pose(&self, pose: PoseStamped) -> bool;
+    /// Publishes on `SOURCE/wrench` or `SOURCE/pose`, best effort; returns whether it was sent.
+    fn publish(&self, message: LiveMessage) -> bool;
 
     /// Current number of listeners: to wrenches, to poses.
     fn listeners(&mut self) -> [usize; 2];

@@ -3,11 +3,9 @@
 use std::time::Instant;
 
 use crate::ros::arguments::NodeConfig;
-use crate::ros::convert::{as_pose, as_wrench};
 use crate::ros::parameters::CELL_FRAME;
 use crate::ros::port::Arrival;
 use touchup_io::recording::{BadMessage, LiveMessage, LiveType, SampleKind};
-use touchup_method::stylus::Message;
 
 /// A topic of poses or of wrenches.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -107,17 +105,16 @@ impl SampleSource {
         of: LiveType,
         read: Result<LiveMessage, BadMessage>,
     ) -> Arrival {
-        let LiveMessage { frame, message } = match read {
-            Ok(read) => read,
+        let mut message = match read {
+            Ok(message) => message,
             Err(BadMessage::Quaternion) => return self.refused("quaternion"),
             Err(BadMessage::Stamp) => return self.refused("stamp"),
             Err(bad) => return Arrival::Unreadable(topic, format!("{bad}, read as {}", of.name())),
         };
-        let frame = if of.has_header() { &frame } else { &self.frame };
-        match &message {
-            Message::Pose(pose) => Arrival::Pose(as_pose(pose, frame), Instant::now()),
-            Message::Wrench(wrench) => Arrival::Wrench(as_wrench(wrench, frame), Instant::now()),
+        if !of.has_header() {
+            message.frame.clone_from(&self.frame);
         }
+        Arrival::Message(message, Instant::now())
     }
 
     fn refused(&self, reason: &'static str) -> Arrival {
@@ -132,7 +129,7 @@ impl SampleSource {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use touchup_method::stylus::{StampedWrench, Wrench};
+    use touchup_method::stylus::{Message, StampedWrench, Wrench};
 
     fn source(kind: SampleKind, arguments: &[&str]) -> Option<SampleSource> {
         let arguments: Vec<_> = arguments
@@ -202,7 +199,7 @@ mod tests {
                 of,
                 Ok(read),
             ) {
-                Arrival::Wrench(wrench, _) => wrench.header.frame_id,
+                Arrival::Message(message, _) => message.frame,
                 other => panic!("{other:?}"),
             }
         };

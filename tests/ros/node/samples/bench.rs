@@ -9,14 +9,13 @@ use nalgebra::Isometry3;
 use tempfile::TempDir;
 use touchup::clock::{Clock, ManualClock};
 use touchup::io::mesh_file::{MeshUnit, write_mesh};
-use touchup::io::recording::{Topics, write_recording};
+use touchup::io::recording::{LiveMessage, Topics, write_recording};
 use touchup::mesh::TriMesh;
 use touchup::node::{INBOX, Node, NodeEnd, PreparedNode};
 use touchup::ros::in_process::{OtherParticipants, start};
 use touchup::ros::inbox::inbox;
 use touchup::ros::messages::{
-    Header, MeshPatch, Point, Pose, PoseStamped, Quaternion, Time, Transform, TransformStamped,
-    Vector3, Wrench, WrenchStamped,
+    Header, MeshPatch, Quaternion, Time, Transform, TransformStamped, Vector3,
 };
 use touchup::ros::parameters::{ParameterValue, Parameters};
 use touchup::ros::port::{Arrival, Call, Publication, Reply};
@@ -119,66 +118,24 @@ fn header(stamp_ns: i64, frame: &str) -> Header {
     }
 }
 
-pub fn pose(message: &Message, frame: &str) -> PoseStamped {
-    let Message::Pose(pose) = message else {
-        panic!("no pose")
-    };
-    let (p, q) = (pose.pose_ot.translation.vector, pose.pose_ot.rotation);
-    let orientation = Quaternion {
-        x: q.i,
-        y: q.j,
-        z: q.k,
-        w: q.w,
-    };
-    PoseStamped {
-        header: header(message.stamp_ns(), frame),
-        pose: Pose {
-            position: Point {
-                x: p.x,
-                y: p.y,
-                z: p.z,
-            },
-            orientation,
-        },
-    }
-}
-
-pub fn wrench(message: &Message, frame: &str) -> WrenchStamped {
-    let Message::Wrench(wrench) = message else {
-        panic!("no wrench")
-    };
-    let (f, t) = (wrench.wrench.force, wrench.wrench.torque);
-    let wrench = Wrench {
-        force: Vector3 {
-            x: f.x,
-            y: f.y,
-            z: f.z,
-        },
-        torque: Vector3 {
-            x: t.x,
-            y: t.y,
-            z: t.z,
-        },
-    };
-    WrenchStamped {
-        header: header(message.stamp_ns(), frame),
-        wrench,
+pub fn in_frame(message: &Message, frame: &str) -> LiveMessage {
+    LiveMessage {
+        frame: frame.to_owned(),
+        message: *message,
     }
 }
 
 /// A pose as somebody at `place` (in O) measures it.
-pub fn seen_from(message: &Message, place: &Isometry3<f64>, frame: &str) -> PoseStamped {
+pub fn seen_from(message: &Message, place: &Isometry3<f64>, frame: &str) -> LiveMessage {
     let Message::Pose(measured) = message else {
         panic!("no pose")
     };
     let pose_ot = place.inv_mul(&measured.pose_ot);
-    pose(
-        &Message::Pose(StampedPose {
-            pose_ot,
-            ..*measured
-        }),
-        frame,
-    )
+    let pose = Message::Pose(StampedPose {
+        pose_ot,
+        ..*measured
+    });
+    in_frame(&pose, frame)
 }
 
 pub fn transform(
@@ -303,10 +260,11 @@ impl Bench {
 
     /// As a port delivers it now.
     pub fn arrival(&self, message: &Message) -> Arrival {
-        match message {
-            Message::Pose(_) => Arrival::Pose(pose(message, "object"), self.now()),
-            Message::Wrench(_) => Arrival::Wrench(wrench(message, "stylus"), self.now()),
-        }
+        let frame = match message {
+            Message::Pose(_) => "object",
+            Message::Wrench(_) => "stylus",
+        };
+        Arrival::Message(in_frame(message, frame), self.now())
     }
 
     /// Time of the node.

@@ -8,9 +8,9 @@ use std::collections::BTreeMap;
 use std::f64::consts::PI;
 use std::time::Duration;
 
-use bench::{Bench, Plate, patches, pose, read, refine, seen_from, transform, wrench};
+use bench::{Bench, Plate, in_frame, patches, read, refine, seen_from, transform};
 use follower::Follower;
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use touchup::io::recording::{RecordingReader, Topics};
@@ -242,48 +242,37 @@ fn triangle(points: &[Point]) -> [[f32; 3]; 3] {
 fn what_cannot_be_is_refused_and_counted_and_the_rest_goes_on() {
     let plate = Plate::touched(0.05);
     let mut bench = Bench::start(&plate);
-    let is_pose = |message: &&Message| matches!(message, Message::Pose(_));
-    let some_pose = plate.messages.iter().find(is_pose).unwrap();
-    let some_wrench = plate
-        .messages
-        .iter()
-        .find(|message| !is_pose(message))
-        .unwrap();
+    let pose_of = |message: &Message| match message {
+        Message::Pose(pose) => Some(*pose),
+        Message::Wrench(_) => None,
+    };
+    let wrench_of = |message: &Message| match message {
+        Message::Wrench(wrench) => Some(*wrench),
+        Message::Pose(_) => None,
+    };
+    let some_pose = plate.messages.iter().find_map(pose_of).unwrap();
+    let some_wrench = plate.messages.iter().find_map(wrench_of).unwrap();
     for (at, message) in plate.messages.iter().enumerate() {
         if at % 100 == 50 {
-            let mut nan = pose(some_pose, "object");
-            nan.pose.position.x = f64::NAN;
-            let mut zero = pose(some_pose, "object");
-            zero.pose.orientation = touchup::ros::messages::Quaternion {
-                x: 0.0,
-                y: 0.0,
-                z: 0.0,
-                w: 0.0,
-            };
-            let mut no_time = wrench(some_wrench, "stylus");
-            no_time.header.stamp.sec = -5;
-            let mut far = wrench(some_wrench, "stylus");
+            let (mut nan, mut zero) = (some_pose, some_pose);
+            nan.pose_ot.translation.x = f64::NAN;
+            zero.pose_ot.rotation = UnitQuaternion::new_unchecked(Quaternion::default());
+            let (mut no_time, mut far) = (some_wrench, some_wrench);
+            no_time.stamp_ns = -5_000_000_000;
             far.wrench.force.z = 1e9;
-            for bad in [
-                nan,
-                zero,
-                pose(some_pose, "nowhere"),
-                pose(some_pose, ""),
-                pose(some_pose, "object"),
+            for (bad, frame) in [
+                (Message::Pose(nan), "object"),
+                (Message::Pose(zero), "object"),
+                (Message::Pose(some_pose), "nowhere"),
+                (Message::Pose(some_pose), ""),
+                (Message::Pose(some_pose), "object"),
+                (Message::Wrench(no_time), "stylus"),
+                (Message::Wrench(far), "stylus"),
+                (Message::Wrench(some_wrench), "nowhere"),
+                (Message::Wrench(some_wrench), "object"),
             ] {
-                bench
-                    .world
-                    .arrive_patiently(Arrival::Pose(bad, bench.now()));
-            }
-            for bad in [
-                no_time,
-                far,
-                wrench(some_wrench, "nowhere"),
-                wrench(some_wrench, "object"),
-            ] {
-                bench
-                    .world
-                    .arrive_patiently(Arrival::Wrench(bad, bench.now()));
+                let arrival = Arrival::Message(in_frame(&bad, frame), bench.now());
+                bench.world.arrive_patiently(arrival);
             }
             bench
                 .world
@@ -356,7 +345,7 @@ fn poses_wait_for_the_transform_of_a_moving_frame_and_not_for_ever() {
         for message in part {
             bench.world.arrive_patiently(match message {
                 Message::Pose(of) => {
-                    Arrival::Pose(seen_from(message, &rig(of.stamp_ns), "rig"), bench.now())
+                    Arrival::Message(seen_from(message, &rig(of.stamp_ns), "rig"), bench.now())
                 }
                 Message::Wrench(_) => bench.arrival(message),
             });

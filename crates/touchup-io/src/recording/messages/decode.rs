@@ -2,12 +2,12 @@
 //!
 //! Quaternions are x, y, z, w here and in the encoders, and nowhere else.
 
-use super::franka::{FrankaSample, franka_robot_state, franka_state};
+use super::franka::{franka_robot_state, franka_state};
 use super::message_type::{MessageFormat, MessageType};
 use super::point_cloud;
 use super::wire::{MessageFields, RosHeader, WireReader};
 use crate::recording::error::BadMessage;
-use crate::recording::record::Record;
+use crate::recording::record::{LiveMessage, Record};
 use touchup_method::stylus::{FrameTransform, Message, StampedPose, StampedWrench};
 
 /// Content of a message.
@@ -15,7 +15,7 @@ pub(in crate::recording) enum MessageContent {
     /// A pose, wrench or frame of markers, and the frame that its header names.
     Record(String, Record),
     /// A pose and a wrench.
-    State(Box<FrankaSample>),
+    State(Box<[LiveMessage; 2]>),
     /// Links of a tree.
     Transforms(Vec<FrameTransform>),
 }

@@ -4,15 +4,23 @@ use nalgebra::{Isometry3, Matrix3, Rotation3, UnitQuaternion};
 
 use super::wire::{MessageFields, RosHeader, WireFormat};
 use crate::recording::BadMessage;
-use touchup_method::stylus::{StampedPose, StampedWrench};
+use crate::recording::record::LiveMessage;
+use touchup_method::stylus::{Message, StampedPose, StampedWrench, Wrench};
 
-/// Pose and wrench of one instant, each with its frame.
-#[derive(Debug)]
-pub(in crate::recording) struct FrankaSample {
-    pub pose_frame: String,
-    pub pose: StampedPose,
-    pub wrench_frame: String,
-    pub wrench: StampedWrench,
+/// Pose and wrench of one instant, each in its frame.
+fn sample_of(
+    stamp_ns: i64,
+    (pose_frame, pose_ot): (String, Isometry3<f64>),
+    (wrench_frame, wrench): (String, Wrench),
+) -> [LiveMessage; 2] {
+    [
+        (pose_frame, Message::Pose(StampedPose { stamp_ns, pose_ot })),
+        (
+            wrench_frame,
+            Message::Wrench(StampedWrench { stamp_ns, wrench }),
+        ),
+    ]
+    .map(|(frame, message)| LiveMessage { frame, message })
 }
 
 /// Numbers of a `franka_msgs/FrankaState` before `O_F_ext_hat_K`, from there to `O_T_EE`, and
@@ -36,7 +44,7 @@ const FRANKA_FLAGS: std::ops::RangeInclusive<usize> = 1 + 2 * 30..=1 + 2 * 64;
 pub(in crate::recording) fn franka_state(
     wire: WireFormat,
     fields: &mut impl MessageFields,
-) -> Result<FrankaSample, BadMessage> {
+) -> Result<[LiveMessage; 2], BadMessage> {
     let header = fields.header()?;
     let [before, between, behind] = franka_numbers(wire);
     fields.skip_f64s(before)?;
@@ -47,16 +55,8 @@ pub(in crate::recording) fn franka_state(
     flags(fields)?;
     let pose_ot = from_columns(&matrix).ok_or(BadMessage::Quaternion)?;
     let RosHeader { stamp_ns, frame } = header;
-    let (pose, wrench) = (
-        StampedPose { stamp_ns, pose_ot },
-        StampedWrench { stamp_ns, wrench },
-    );
-    Ok(FrankaSample {
-        pose_frame: frame.clone(),
-        pose,
-        wrench_frame: frame,
-        wrench,
-    })
+    let pose = (frame.clone(), pose_ot);
+    Ok(sample_of(stamp_ns, pose, (frame, wrench)))
 }
 
 fn flags(fields: &mut impl MessageFields) -> Result<(), BadMessage> {
@@ -71,7 +71,7 @@ fn flags(fields: &mut impl MessageFields) -> Result<(), BadMessage> {
 /// with the stamp of the whole, in their own frames, or else in that of the whole.
 pub(in crate::recording) fn franka_robot_state(
     fields: &mut impl MessageFields,
-) -> Result<FrankaSample, BadMessage> {
+) -> Result<[LiveMessage; 2], BadMessage> {
     let whole = fields.header()?;
     // contacts and collisions in space and of the joints
     fields.skip_f64s(4 * 3 + 2 * 7)?;
@@ -96,7 +96,6 @@ pub(in crate::recording) fn franka_robot_state(
     // time and success rate
     fields.skip_f64s(2)?;
     flags(fields)?;
-    let stamp_ns = whole.stamp_ns;
     let frame = |own: RosHeader| {
         if own.frame.is_empty() {
             whole.frame.clone()
@@ -104,12 +103,11 @@ pub(in crate::recording) fn franka_robot_state(
             own.frame
         }
     };
-    Ok(FrankaSample {
-        pose_frame: frame(pose_header),
-        pose: StampedPose { stamp_ns, pose_ot },
-        wrench_frame: frame(wrench_header),
-        wrench: StampedWrench { stamp_ns, wrench },
-    })
+    let (pose, wrench) = (
+        (frame(pose_header), pose_ot),
+        (frame(wrench_header), wrench),
+    );
+    Ok(sample_of(whole.stamp_ns, pose, wrench))
 }
 
 /// Skips a message of a header and `count` numbers.

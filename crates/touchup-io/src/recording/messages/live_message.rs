@@ -9,8 +9,7 @@ use super::message_type::{MessageFormat, MessageType};
 use super::wire::{MAX_MESSAGE_BYTES, SequenceFields, WireFormat};
 use crate::recording::error::BadMessage;
 use crate::recording::layout::TopicKind;
-use crate::recording::record::Record;
-use touchup_method::stylus::Message;
+use crate::recording::record::{LiveMessage, Record};
 
 /// Content of a topic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,15 +34,6 @@ impl SampleKind {
 pub struct LiveType {
     kind: SampleKind,
     message_type: MessageType,
-}
-
-/// A pose or a wrench, and the frame in its header; empty without one.
-#[derive(Clone, Debug, PartialEq)]
-pub struct LiveMessage {
-    /// of the pose, or of the wrench's axes
-    pub frame: String,
-    /// stamp of its header, or else time of reception
-    pub message: Message,
 }
 
 impl LiveType {
@@ -112,14 +102,14 @@ impl LiveType {
             (MessageContent::Record(frame, Record::Message(message)), _) => {
                 Ok(LiveMessage { frame, message })
             }
-            (MessageContent::State(state), SampleKind::Pose) => Ok(LiveMessage {
-                frame: state.pose_frame,
-                message: Message::Pose(state.pose),
-            }),
-            (MessageContent::State(state), SampleKind::Wrench) => Ok(LiveMessage {
-                frame: state.wrench_frame,
-                message: Message::Wrench(state.wrench),
-            }),
+            (MessageContent::State(state), kind) => {
+                let [pose, wrench] = *state;
+                Ok(if kind == SampleKind::Pose {
+                    pose
+                } else {
+                    wrench
+                })
+            }
             (MessageContent::Record(..) | MessageContent::Transforms(_), _) => {
                 Err(BadMessage::Malformed)
             }

@@ -10,12 +10,13 @@ use nalgebra::Point3;
 use super::common::SharedArmState;
 use crate::node::setup::Setup;
 use crate::node::side_work::begin;
-use crate::ros::convert::{as_pose, as_wrench};
 use crate::ros::messages::ProbeFeedback;
 use crate::ros::parameters::CELL_FRAME;
 use crate::ros::port::{Feedback, SamplePort};
 use crate::ros::stop::ArmMotion;
 use touchup_geometry::mesh::{FaceHit, TriMesh};
+use touchup_io::recording::LiveMessage;
+use touchup_method::stylus::Message;
 use touchup_probing::arm::{ArmState, Observer, StopRequest};
 use touchup_probing::execute::{Phase, Progress, StaticWorld, World};
 
@@ -73,8 +74,13 @@ impl ArmLink {
         };
         let stamp_ns = state.stamp_ns + self.offset_ns.unwrap_or(0);
         let (pose, wrench) = state.as_probe(stamp_ns);
-        self.samples.publish_pose(as_pose(&pose, base));
-        self.samples.publish_wrench(as_wrench(&wrench, &setup.tool));
+        for (frame, message) in [
+            (base, Message::Pose(pose)),
+            (&setup.tool, Message::Wrench(wrench)),
+        ] {
+            let frame = frame.to_owned();
+            self.samples.publish(LiveMessage { frame, message });
+        }
     }
 }
 

@@ -5,14 +5,13 @@
 //! (`scan_to_space`), else the object frame. A wrench goes to the sensor's own axes, or to those of
 //! the poses. So the recording of a session and its scene suffice for the same result.
 
-use nalgebra::{Isometry3, UnitQuaternion};
+use nalgebra::Isometry3;
 
-use crate::ros::convert::{isometry, stamp_ns, vector_of};
-use crate::ros::messages::{PoseStamped, WrenchStamped};
 use crate::ros::parameters::CELL_FRAME;
+use touchup_io::recording::LiveMessage;
 use touchup_method::stylus::{
     FrameBuffer, FrameError, Message, Placement, StampedPose, StampedWrench, Wrench, WrenchFrame,
-    plain_name,
+    measured_rotation, plain_name,
 };
 
 /// Frame of the poses otherwise, as named in recordings.
@@ -99,30 +98,42 @@ impl FrameResolver {
         self.placement.place(message, self.axes.unwrap_or_default())
     }
 
+    /// The message in the frame of the recording.
+    ///
     /// # Errors
     /// [`Refusal`]
-    pub fn pose(&self, stamped: &PoseStamped) -> Result<Message, Refusal> {
-        let stamp_ns = stamp_ns(&stamped.header.stamp).ok_or(Refusal::Stamp)?;
-        let mut pose_ot = isometry(&stamped.pose).ok_or(Refusal::Quaternion)?;
-        if let Some(frame) = self.recorded_from(&stamped.header.frame_id, stamp_ns)? {
-            pose_ot = frame * pose_ot;
+    pub fn recorded(
+        &mut self,
+        LiveMessage { frame, message }: &LiveMessage,
+    ) -> Result<Message, Refusal> {
+        if message.stamp_ns() < 0 {
+            return Err(Refusal::Stamp);
         }
-        Ok(Message::Pose(StampedPose { stamp_ns, pose_ot }))
+        match *message {
+            Message::Pose(pose) => self.pose(frame, pose).map(Message::Pose),
+            Message::Wrench(wrench) => self.wrench(frame, wrench).map(Message::Wrench),
+        }
     }
 
-    /// # Errors
-    /// [`Refusal`]
-    pub fn wrench(&mut self, stamped: &WrenchStamped) -> Result<Message, Refusal> {
-        let stamp_ns = stamp_ns(&stamped.header.stamp).ok_or(Refusal::Stamp)?;
-        let wrench = Wrench {
-            force: vector_of(&stamped.wrench.force),
-            torque: vector_of(&stamped.wrench.torque),
-        };
-        let (axes, wrench) = self.turned(&stamped.header.frame_id, stamp_ns, wrench)?;
+    fn pose(&self, frame: &str, mut pose: StampedPose) -> Result<StampedPose, Refusal> {
+        let turn = measured_rotation(pose.pose_ot.rotation.into_inner());
+        pose.pose_ot.rotation = turn.ok_or(Refusal::Quaternion)?;
+        if let Some(frame) = self.recorded_from(frame, pose.stamp_ns)? {
+            pose.pose_ot = frame * pose.pose_ot;
+        }
+        Ok(pose)
+    }
+
+    fn wrench(
+        &mut self,
+        frame: &str,
+        StampedWrench { stamp_ns, wrench }: StampedWrench,
+    ) -> Result<StampedWrench, Refusal> {
+        let (axes, wrench) = self.turned(frame, stamp_ns, wrench)?;
         if *self.axes.get_or_insert(axes) != axes {
             return Err(Refusal::AxesChanged);
         }
-        Ok(Message::Wrench(StampedWrench { stamp_ns, wrench }))
+        Ok(StampedWrench { stamp_ns, wrench })
     }
 
     fn turned(
@@ -147,19 +158,11 @@ impl FrameResolver {
             && !name.is_empty()
             && let Ok(pose_sf) = self.frames.pose(sensor, name, stamp_ns)
         {
-            let force = pose_sf.rotation * wrench.force;
-            let torque =
-                pose_sf.rotation * wrench.torque + pose_sf.translation.vector.cross(&force);
-            return Ok((WrenchFrame::Sensor, Wrench { force, torque }));
+            return Ok((WrenchFrame::Sensor, wrench.moved(&pose_sf)));
         }
-        let turn = self
-            .recorded_from(frame, stamp_ns)?
-            .map(|pose| pose.rotation);
-        let of = |turn: UnitQuaternion<f64>| Wrench {
-            force: turn * wrench.force,
-            torque: turn * wrench.torque,
-        };
-        Ok((WrenchFrame::Object, turn.map_or(wrench, of)))
+        let pose = self.recorded_from(frame, stamp_ns)?;
+        let wrench = pose.map_or(wrench, |pose| wrench.turned(&pose.rotation));
+        Ok((WrenchFrame::Object, wrench))
     }
 
     /// Pose of `frame` in the frame of the recording; `None` for that frame itself.
@@ -208,13 +211,12 @@ impl FrameResolver {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::{Vector3, vector};
+    use nalgebra::{Quaternion as Q, UnitQuaternion, Vector3, vector};
 
     use super::*;
     use crate::ros::convert::frame_transform;
     use crate::ros::messages::{
-        Header, Point, Pose, Quaternion, Time, Transform, TransformStamped, Vector3 as V,
-        Wrench as W,
+        Header, Quaternion, Time, Transform, TransformStamped, Vector3 as V,
     };
 
     fn header(frame: &str) -> Header {
@@ -224,38 +226,31 @@ mod tests {
         }
     }
 
-    fn pose(frame: &str) -> PoseStamped {
-        let orientation = Quaternion {
-            x: 0.0,
-            y: 0.0,
-            z: 0.0,
-            w: 1.0,
-        };
-        PoseStamped {
-            header: header(frame),
-            pose: Pose {
-                position: Point {
-                    x: 1.0,
-                    y: 2.0,
-                    z: 3.0,
-                },
-                orientation,
-            },
+    const STAMP_NS: i64 = 5_000_000_000;
+
+    fn pose(frame: &str) -> LiveMessage {
+        let pose_ot = Isometry3::translation(1.0, 2.0, 3.0);
+        turned_pose(frame, STAMP_NS, pose_ot)
+    }
+
+    fn turned_pose(frame: &str, stamp_ns: i64, pose_ot: Isometry3<f64>) -> LiveMessage {
+        LiveMessage {
+            frame: frame.to_owned(),
+            message: Message::Pose(StampedPose { stamp_ns, pose_ot }),
         }
     }
 
-    fn wrench(frame: &str) -> WrenchStamped {
-        let force = V {
-            x: 1.0,
-            y: 0.0,
-            z: 0.0,
+    fn wrench(frame: &str) -> LiveMessage {
+        let wrench = Wrench {
+            force: Vector3::x(),
+            torque: Vector3::zeros(),
         };
-        WrenchStamped {
-            header: header(frame),
-            wrench: W {
-                force,
-                torque: V::default(),
-            },
+        LiveMessage {
+            frame: frame.to_owned(),
+            message: Message::Wrench(StampedWrench {
+                stamp_ns: STAMP_NS,
+                wrench,
+            }),
         }
     }
 
@@ -313,50 +308,56 @@ mod tests {
     /// Worked by hand.
     #[test]
     fn poses_come_into_the_frame_of_the_object() {
-        let resolver = resolver(None);
+        let mut resolver = resolver(None);
         assert_eq!(
-            position(resolver.pose(&pose("object")).unwrap()),
+            position(resolver.recorded(&pose("object")).unwrap()),
             vector![1.0, 2.0, 3.0]
         );
         assert_eq!(
-            position(resolver.pose(&pose("cell")).unwrap()),
+            position(resolver.recorded(&pose("cell")).unwrap()),
             vector![1.0, 2.0, 3.0]
         );
-        let turned = position(resolver.pose(&pose("/base")).unwrap());
+        let turned = position(resolver.recorded(&pose("/base")).unwrap());
         assert!(
             (turned - vector![-1.0, 1.0, 3.0]).norm() < 1e-12,
             "{turned}"
         );
-        assert_eq!(resolver.pose(&pose("")).unwrap_err(), Refusal::NoFrame);
+        assert_eq!(resolver.recorded(&pose("")).unwrap_err(), Refusal::NoFrame);
         assert_eq!(
-            resolver.pose(&pose("nowhere")).unwrap_err().name(),
+            resolver.recorded(&pose("nowhere")).unwrap_err().name(),
             "unknown_frame"
         );
-        let mut bad = pose("object");
-        bad.pose.orientation.w = 0.0;
-        assert_eq!(resolver.pose(&bad).unwrap_err(), Refusal::Quaternion);
-        bad.header.stamp.nanosec = 1_000_000_000;
-        assert_eq!(resolver.pose(&bad).unwrap_err(), Refusal::Stamp);
+        let no_turn = UnitQuaternion::new_unchecked(Q::default());
+        let bad = |stamp_ns| {
+            let pose = Isometry3::from_parts(Vector3::zeros().into(), no_turn);
+            turned_pose("object", stamp_ns, pose)
+        };
+        assert_eq!(
+            resolver.recorded(&bad(STAMP_NS)).unwrap_err(),
+            Refusal::Quaternion
+        );
+        assert_eq!(resolver.recorded(&bad(-1)).unwrap_err(), Refusal::Stamp);
     }
 
     #[test]
     fn with_scan_to_space_they_come_into_the_cell() {
         let pose_wo = Some(Isometry3::translation(10.0, 0.0, 0.0));
-        let resolver = resolver(Some(Placement {
+        let mut resolver = resolver(Some(Placement {
             pose_wo,
             p_ht: None,
         }));
         assert_eq!(resolver.recorded_frame(), "cell");
         assert_eq!(
-            position(resolver.pose(&pose("cell")).unwrap()),
+            position(resolver.recorded(&pose("cell")).unwrap()),
             vector![1.0, 2.0, 3.0],
             "bit by bit"
         );
         assert_eq!(
-            position(resolver.pose(&pose("object")).unwrap()),
+            position(resolver.recorded(&pose("object")).unwrap()),
             vector![11.0, 2.0, 3.0]
         );
-        let placed = resolver.placed(resolver.pose(&pose("base")).unwrap());
+        let recorded = resolver.recorded(&pose("base")).unwrap();
+        let placed = resolver.placed(recorded);
         assert!((position(placed) - vector![-1.0, 1.0, 3.0]).norm() < 1e-12);
         assert_eq!(
             resolver
@@ -373,28 +374,32 @@ mod tests {
     fn wrenches_come_into_the_axes_of_the_sensor_or_of_the_object() {
         let mut of_sensor = resolver(None);
         assert_eq!(
-            force(of_sensor.wrench(&wrench("stylus")).unwrap()),
+            force(of_sensor.recorded(&wrench("stylus")).unwrap()),
             Vector3::x()
         );
         assert_eq!(
-            force(of_sensor.wrench(&wrench("stylus_sensor")).unwrap()),
+            force(of_sensor.recorded(&wrench("stylus_sensor")).unwrap()),
             Vector3::x()
         );
-        assert!((force(of_sensor.wrench(&wrench("gauge")).unwrap()) - Vector3::y()).norm() < 1e-12);
+        assert!(
+            (force(of_sensor.recorded(&wrench("gauge")).unwrap()) - Vector3::y()).norm() < 1e-12
+        );
         assert_eq!(of_sensor.axes, Some(WrenchFrame::Sensor));
         assert_eq!(
-            of_sensor.wrench(&wrench("object")).unwrap_err(),
+            of_sensor.recorded(&wrench("object")).unwrap_err(),
             Refusal::AxesChanged
         );
         let mut of_object = resolver(None);
-        assert!((force(of_object.wrench(&wrench("base")).unwrap()) - Vector3::y()).norm() < 1e-12);
+        assert!(
+            (force(of_object.recorded(&wrench("base")).unwrap()) - Vector3::y()).norm() < 1e-12
+        );
         assert_eq!(
-            force(of_object.wrench(&wrench("object")).unwrap()),
+            force(of_object.recorded(&wrench("object")).unwrap()),
             Vector3::x()
         );
         assert_eq!(of_object.axes, Some(WrenchFrame::Object));
         assert_eq!(
-            of_object.wrench(&wrench("elsewhere")).unwrap_err().name(),
+            of_object.recorded(&wrench("elsewhere")).unwrap_err().name(),
             "unknown_frame"
         );
     }

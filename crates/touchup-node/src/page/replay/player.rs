@@ -25,8 +25,8 @@ use crate::ros::inbox::{Inbox, inbox};
 use crate::ros::parameters::CELL_FRAME;
 use crate::ros::parameters::{ParameterValue, Parameters};
 use crate::ros::port::{Arrival, ReplayStep, SamplePort};
-use crate::ros::{as_pose, as_wrench};
 use touchup_io::mesh_file::MeshUnit;
+use touchup_io::recording::LiveMessage;
 use touchup_io::session_folder::SessionFolder;
 use touchup_method::stylus::Message;
 use touchup_session::clock::Clock;
@@ -225,13 +225,11 @@ fn play_once(
             ReplayNext::Go => {}
             next => return Ok(next),
         }
-        let is_taken = match &message {
-            Message::Wrench(wrench) => {
-                stylus.publish_wrench(as_wrench(wrench, &recording.wrench_frame))
-            }
-            Message::Pose(pose) => stylus.publish_pose(as_pose(pose, CELL_FRAME)),
+        let frame = match &message {
+            Message::Wrench(_) => recording.wrench_frame.clone(),
+            Message::Pose(_) => CELL_FRAME.to_owned(),
         };
-        if !is_taken {
+        if !stylus.publish(LiveMessage { frame, message }) {
             return Err(ENDED.to_owned());
         }
     }

@@ -10,9 +10,12 @@ use ros2_client::{Node, NodeOptions, Publisher};
 use super::back_end::{DdsErrorContext, join};
 use super::topics::{BEST_EFFORT, keep, make_topic};
 use crate::ros::arguments::NodeConfig;
+use crate::ros::convert::{as_pose, as_wrench};
 use crate::ros::exchange::RosError;
 use crate::ros::messages::{PoseStamped, RosMessage, WrenchStamped};
 use crate::ros::port::SamplePort;
+use touchup_io::recording::LiveMessage;
+use touchup_method::stylus::Message;
 
 /// Nothing is resent: the history serves readers that read at once.
 const DEPTH: usize = 100;
@@ -67,12 +70,11 @@ fn send<M: RosMessage>(publisher: &Publisher<M>, message: M) -> bool {
 }
 
 impl SamplePort for DdsSamples {
-    fn publish_wrench(&self, wrench: WrenchStamped) -> bool {
-        send(&self.wrench, wrench)
-    }
-
-    fn publish_pose(&self, pose: PoseStamped) -> bool {
-        send(&self.pose, pose)
+    fn publish(&self, LiveMessage { frame, message }: LiveMessage) -> bool {
+        match message {
+            Message::Wrench(wrench) => send(&self.wrench, as_wrench(&wrench, &frame)),
+            Message::Pose(pose) => send(&self.pose, as_pose(&pose, &frame)),
+        }
     }
 
     fn listeners(&mut self) -> [usize; 2] {

@@ -7,10 +7,12 @@ use super::context;
 use super::convert::Convert;
 use super::topics::profile;
 use crate::ros::arguments::NodeConfig;
+use crate::ros::convert::{as_pose, as_wrench};
 use crate::ros::exchange::RosError;
-use crate::ros::messages::{PoseStamped, WrenchStamped};
 use crate::ros::port::SamplePort;
 use crate::ros::topics::Topic;
+use touchup_io::recording::LiveMessage;
+use touchup_method::stylus::Message;
 
 /// Nothing is resent: the history serves readers that read at once.
 const DEPTH: usize = 100;
@@ -51,12 +53,14 @@ fn count<T: WrappedTypesupport + 'static>(publisher: &Publisher<T>) -> usize {
 }
 
 impl SamplePort for R2rSamples {
-    fn publish_wrench(&self, wrench: WrenchStamped) -> bool {
-        self.wrench.publish(&wrench.theirs()).is_ok()
-    }
-
-    fn publish_pose(&self, pose: PoseStamped) -> bool {
-        self.pose.publish(&pose.theirs()).is_ok()
+    fn publish(&self, LiveMessage { frame, message }: LiveMessage) -> bool {
+        match message {
+            Message::Wrench(wrench) => self
+                .wrench
+                .publish(&as_wrench(&wrench, &frame).theirs())
+                .is_ok(),
+            Message::Pose(pose) => self.pose.publish(&as_pose(&pose, &frame).theirs()).is_ok(),
+        }
     }
 
     fn listeners(&mut self) -> [usize; 2] {
