@@ -5,10 +5,9 @@ use std::io::{self, Read};
 use std::path::Path;
 
 use super::RecordingLayout;
-use super::bags::bag::BagReader;
-use super::bags::bag_index;
+use super::bags::{bag, bag_index};
 use super::db3::{self, Db3Reader};
-use super::mcap_files::mcap::{self, McapReader};
+use super::mcap_files::mcap;
 use crate::recording::compression::ZSTD_MAGIC;
 use crate::recording::error::RecordingError;
 use crate::recording::recording_file::RecordingFile;
@@ -31,12 +30,12 @@ pub(super) fn open_file(
         front = unpacked.map_err(io)?;
     }
     if front.starts_with(&mcap::MAGIC) {
-        let (reader, damage) = McapReader::open(path, layout, packed)?;
+        let (reader, damage) = mcap::open(path, layout, packed)?;
         Ok((Box::new(reader), damage))
     } else if front == db3::MAGIC {
         Ok((Box::new(Db3Reader::open(path, layout, packed)?), None))
     } else if front.starts_with(bag_index::MAGIC) && !packed {
-        let (reader, damage) = BagReader::open(path, layout)?;
+        let (reader, damage) = bag::open(path, layout)?;
         Ok((Box::new(reader), damage))
     } else {
         Err(RecordingError::NotARecording {

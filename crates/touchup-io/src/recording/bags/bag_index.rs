@@ -1,14 +1,14 @@
 //! The headers of the records of a ROS 1 bag, its connections and its index.
 
 use std::collections::BTreeMap;
-use std::collections::btree_map::Entry;
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 
 use crate::recording::Damage;
 use crate::recording::layout::{RecordingLayout, TopicInfo};
-use crate::recording::mcap_files::framing::{Fields, NameBytes, check_length};
+use crate::recording::mcap_files::chunked::{DescribedTopics, FileIndex};
+use crate::recording::mcap_files::framing::{Fields, check_length};
 
 pub(in crate::recording) const MAGIC: &[u8] = b"#ROSBAG V2.0\n";
 /// Length in front of a header, and in front of data.
@@ -84,15 +84,14 @@ fn named_fields(bytes: &[u8]) -> Result<Vec<NamedField<'_>>, Damage> {
 /// Connections up to now: a topic has one for each of its publishers.
 #[derive(Default)]
 pub(in crate::recording) struct Connections {
-    pub topics: BTreeMap<u32, TopicInfo>,
-    name_bytes: NameBytes,
+    pub topics: DescribedTopics,
 }
 
 /// Memory of a connection beside its names.
 const CONNECTION_BYTES: usize = 128;
 
 impl Connections {
-    pub fn add(&mut self, head: &RecordHeader, data: &[u8]) -> Result<&TopicInfo, Damage> {
+    pub fn add(&mut self, head: &RecordHeader, data: &[u8]) -> Result<(), Damage> {
         let fields = named_fields(data)?;
         let named = |wanted: &[u8]| {
             fields
@@ -107,100 +106,66 @@ impl Connections {
             type_name,
             encoding: "ros1".to_owned(),
         };
-        let bytes = |info: &TopicInfo| info.name_bytes() + CONNECTION_BYTES;
-        self.name_bytes.take(
-            bytes(&info),
-            self.topics.get(&head.connection).map_or(0, bytes),
-        )?;
-        Ok(match self.topics.entry(head.connection) {
-            Entry::Vacant(place) => place.insert(info),
-            Entry::Occupied(mut known) => {
-                known.insert(info);
-                known.into_mut()
-            }
-        })
-    }
-
-    pub fn has(&self, layout: &RecordingLayout) -> bool {
-        layout.needed().all(|kind| {
-            self.topics
-                .values()
-                .any(|info| layout.is_topic(kind, &info.name))
-        })
+        self.topics.add(head.connection, info, CONNECTION_BYTES)
     }
 }
 
-/// The index at the end of the bag.
-pub(in crate::recording) struct BagIndex {
-    pub connections: Connections,
-    /// messages of each connection
-    counts: BTreeMap<u32, u64>,
+/// The index at the end of the bag; `None` without one, as in a bag of a killed recorder: then the
+/// reader searches the data.
+pub(in crate::recording) fn read_index(
+    path: &Path,
+    layout: &RecordingLayout,
+) -> Option<FileIndex<Connections>> {
+    let mut file = File::open(path).ok()?;
+    let size = file.metadata().ok()?.len();
+    file.seek(SeekFrom::Start(MAGIC.len() as u64)).ok()?;
+    let mut length = [0; LENGTH_BYTES as usize];
+    file.read_exact(&mut length).ok()?;
+    let length = u64::from(u32::from_le_bytes(length));
+    check_length("header of the bag", length).ok()?;
+    let mut header = Vec::new();
+    file.by_ref().take(length).read_to_end(&mut header).ok()?;
+    let start = RecordHeader::of(&header).ok()?.index_at;
+    let length = size.checked_sub(start).filter(|_| start > 0)?;
+    check_length("index", length).ok()?;
+    file.seek(SeekFrom::Start(start)).ok()?;
+    let mut records = Vec::new();
+    file.take(length).read_to_end(&mut records).ok()?;
+    let mut connections = Connections::default();
+    let counts = read_counts(&mut connections, &records).ok()?;
+    Some(FileIndex {
+        promised: Some(connections.topics.promised(&counts, layout)),
+        format: connections,
+        is_complete: true,
+    })
 }
 
-impl BagIndex {
-    /// `None` without an index, as in a bag of a killed recorder: then the reader searches the
-    /// data.
-    pub fn read(path: &Path) -> Option<Self> {
-        let mut file = File::open(path).ok()?;
-        let size = file.metadata().ok()?.len();
-        file.seek(SeekFrom::Start(MAGIC.len() as u64)).ok()?;
-        let mut length = [0; LENGTH_BYTES as usize];
-        file.read_exact(&mut length).ok()?;
-        let length = u64::from(u32::from_le_bytes(length));
-        check_length("header of the bag", length).ok()?;
-        let mut header = Vec::new();
-        file.by_ref().take(length).read_to_end(&mut header).ok()?;
-        let start = RecordHeader::of(&header).ok()?.index_at;
-        let length = size.checked_sub(start).filter(|_| start > 0)?;
-        check_length("index", length).ok()?;
-        file.seek(SeekFrom::Start(start)).ok()?;
-        let mut records = Vec::new();
-        file.take(length).read_to_end(&mut records).ok()?;
-        let mut index = Self {
-            connections: Connections::default(),
-            counts: BTreeMap::new(),
-        };
-        index.add_records(&records).ok()?;
-        Some(index)
-    }
-
-    fn add_records(&mut self, records: &[u8]) -> Result<(), Damage> {
-        let mut rest = Fields(records);
-        while !rest.0.is_empty() {
-            let (header, data) = (
-                rest.sized("header of a record")?,
-                rest.sized("data of a record")?,
-            );
-            let head = RecordHeader::of(header)?;
-            match head.op {
-                op::CONNECTION => drop(self.connections.add(&head, data)?),
-                op::CHUNK_INFO => {
-                    let mut counts = Fields(data);
-                    for _ in 0..head.count {
-                        let (id, count) = (counts.u32("chunk info")?, counts.u32("chunk info")?);
-                        if !self.connections.topics.contains_key(&id) {
-                            return Err(Damage::Field("connection of a chunk info"));
-                        }
-                        *self.counts.entry(id).or_default() += u64::from(count);
+/// Adds the connections of an index; returns the number of messages of each.
+fn read_counts(
+    connections: &mut Connections,
+    records: &[u8],
+) -> Result<BTreeMap<u32, u64>, Damage> {
+    let (mut rest, mut counts) = (Fields(records), BTreeMap::new());
+    while !rest.0.is_empty() {
+        let (header, data) = (
+            rest.sized("header of a record")?,
+            rest.sized("data of a record")?,
+        );
+        let head = RecordHeader::of(header)?;
+        match head.op {
+            op::CONNECTION => connections.add(&head, data)?,
+            op::CHUNK_INFO => {
+                let mut infos = Fields(data);
+                for _ in 0..head.count {
+                    let (id, count) = (infos.u32("chunk info")?, infos.u32("chunk info")?);
+                    if !connections.topics.infos.contains_key(&id) {
+                        return Err(Damage::Field("connection of a chunk info"));
                     }
+                    *counts.entry(id).or_default() += u64::from(count);
                 }
-                _ => {}
             }
+            _ => {}
         }
-        Ok(())
     }
-
-    /// Messages on the topics of a touch.
-    pub fn promised(&self, layout: &RecordingLayout) -> u64 {
-        let topics = &self.connections.topics;
-        let wanted = |id: &u32| {
-            topics
-                .get(id)
-                .is_some_and(|info| layout.kind_of(&info.name).is_some())
-        };
-        self.counts
-            .iter()
-            .filter(|(id, _)| wanted(id))
-            .fold(0, |sum: u64, (_, count)| sum.saturating_add(*count))
-    }
+    Ok(counts)
 }
