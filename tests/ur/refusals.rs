@@ -117,7 +117,7 @@ fn a_wrong_controller_or_library_is_refused() {
             mass: f64::NAN,
             ..params.clone()
         });
-        assert!(matches!(bad, UrError::BadParameter { .. }), "{bad}");
+        assert!(matches!(bad, UrError::Parameters(_)), "{bad}");
         let bad = error(UrParams {
             program: "/bin/false".into(),
             ..params

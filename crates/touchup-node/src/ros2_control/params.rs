@@ -6,7 +6,7 @@ use std::time::Duration;
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
 use touchup_method::stylus::Payload;
-use touchup_probing::arm::{ArmError, ArmGeometry, UrGeometry};
+use touchup_probing::arm::{ArmError, ArmGeometry, UrGeometry, check_parameters};
 use touchup_session::clock::Clock;
 use touchup_session::scene::Ros2ControlSection;
 
@@ -76,49 +76,26 @@ impl Default for Ros2ControlParams {
 impl Ros2ControlParams {
     /// Checks the parameters before listening.
     pub(super) fn check(&self) -> Result<(), ArmError> {
-        let refuse = |reason: String| Err(ArmError::refused("its parameters", reason));
         let (joints, names) = (self.geometry.joint_count(), self.joint_names.len());
         if joints != names {
-            return refuse(format!(
-                "the arm has {joints} joints, and {names} are named"
-            ));
+            let reason = format!("the arm has {joints} joints, and {names} are named");
+            return Err(ArmError::refused("its parameters", reason));
         }
-        let numbers = [
-            ("the stiffness", self.stiffness, 10.0, 1e7, "N/m"),
-            ("the latency", self.latency, 1e-3, 0.2, "s"),
-            ("the largest speed", self.top_speed, 1e-3, 1.0, "m/s"),
-            ("the largest force", self.top_force, 0.1, 150.0, "N"),
+        let (connect, silent) = (self.connect.as_secs_f64(), self.silent.as_secs_f64());
+        check_parameters([
+            ("the stiffness", self.stiffness, 10.0, 1e7, " N/m"),
+            ("the latency", self.latency, 1e-3, 0.2, " s"),
+            ("the largest speed", self.top_speed, 1e-3, 1.0, " m/s"),
+            ("the largest force", self.top_force, 0.1, 150.0, " N"),
             (
                 "the largest speed of a joint",
                 self.top_joint_speed,
                 1e-2,
                 20.0,
-                "rad/s",
+                " rad/s",
             ),
-            (
-                "the time to connect",
-                self.connect.as_secs_f64(),
-                0.1,
-                60.0,
-                "s",
-            ),
-            (
-                "the time between two states",
-                self.silent.as_secs_f64(),
-                0.02,
-                0.2,
-                "s",
-            ),
-        ];
-        // NaN is in no range
-        let wrong = numbers
-            .iter()
-            .find(|(_, value, low, high, _)| !(low..=high).contains(&value));
-        let Some((what, value, low, high, unit)) = wrong else {
-            return Ok(());
-        };
-        refuse(format!(
-            "{what} is {value} {unit}; it must be from {low} to {high} {unit}"
-        ))
+            ("the time to connect", connect, 0.1, 60.0, " s"),
+            ("the time between two states", silent, 0.02, 0.2, " s"),
+        ])
     }
 }

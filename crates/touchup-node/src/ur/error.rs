@@ -2,23 +2,14 @@
 
 use std::path::PathBuf;
 
+use touchup_probing::arm::{ArmError, Safety};
+
 /// Reason why no arm is connected. Nothing has moved.
 #[derive(Debug, thiserror::Error)]
 pub enum UrError {
     /// A parameter outside its range.
-    #[error("{what} is {value} {unit}: it has to be from {lowest} to {highest}")]
-    BadParameter {
-        /// name of the parameter
-        what: &'static str,
-        /// value in the unit
-        value: f64,
-        /// minimum in the unit
-        lowest: f64,
-        /// maximum in the unit
-        highest: f64,
-        /// unit of all three values
-        unit: &'static str,
-    },
+    #[error(transparent)]
+    Parameters(ArmError),
     /// No server listens or answers at the address.
     #[error(
         "{host}:{port} ({service}): {reason}; check that the controller is on, the cable and the address"
@@ -87,7 +78,7 @@ pub enum UrError {
     },
     /// A safety function stopped the arm.
     #[error("the arm is stopped: {0}")]
-    Stopped(touchup_probing::arm::Safety),
+    Stopped(Safety),
     /// No ur-rtde, or another version.
     #[error("{}: {reason}; make it with `touchup ur setup`", site_packages.display())]
     Wheel {

@@ -6,6 +6,7 @@ use std::time::Duration;
 use nalgebra::{Isometry3, Vector3};
 
 use super::error::UrError;
+use touchup_probing::arm::check_parameters;
 use touchup_session::clock::Clock;
 
 /// One UR arm with a probe.
@@ -67,43 +68,6 @@ impl UrParams {
 
     /// Checks the parameters before connecting.
     pub(super) fn check(&self) -> Result<(), UrError> {
-        let within =
-            |what: &'static str, value: f64, lowest: f64, highest: f64, unit: &'static str| {
-                // NaN is in no range
-                let is_in = (lowest..=highest).contains(&value);
-                if is_in {
-                    Ok(())
-                } else {
-                    Err(UrError::BadParameter {
-                        what,
-                        value,
-                        lowest,
-                        highest,
-                        unit,
-                    })
-                }
-            };
-        let place = self.pose_ft.translation.vector;
-        within(
-            "the tip's distance from the flange",
-            place.norm(),
-            0.0,
-            1.0,
-            "m",
-        )?;
-        within("the payload", self.mass, 0.0, 16.0, "kg")?;
-        // three zeros would leave the centre unchanged
-        within(
-            "the distance of the payload's centre",
-            self.centre.norm(),
-            1e-6,
-            1.0,
-            "m",
-        )?;
-        within("the largest speed", self.top_speed, 1e-3, 1.0, "m/s")?;
-        within("the largest force", self.top_force, 0.1, 150.0, "N")?;
-        within("the damping of force mode", self.damping, 0.0, 1.0, "")?;
-        within("the gain of force mode", self.gain, 0.0, 2.0, "")?;
         let Deadlines {
             connect,
             beat,
@@ -111,16 +75,32 @@ impl UrParams {
             order,
             dashboard,
         } = self.deadlines;
+        let (place, centre) = (self.pose_ft.translation.vector.norm(), self.centre.norm());
+        let numbers = [
+            ("the tip's distance from the flange", place, 0.0, 1.0, " m"),
+            ("the payload", self.mass, 0.0, 16.0, " kg"),
+            // three zeros would leave the centre unchanged
+            (
+                "the distance of the payload's centre",
+                centre,
+                1e-6,
+                1.0,
+                " m",
+            ),
+            ("the largest speed", self.top_speed, 1e-3, 1.0, " m/s"),
+            ("the largest force", self.top_force, 0.1, 150.0, " N"),
+            ("the damping of force mode", self.damping, 0.0, 1.0, ""),
+            ("the gain of force mode", self.gain, 0.0, 2.0, ""),
+        ];
         let times = [
             ("the time to connect", connect, 30.0),
             ("the time between two beats", beat, 0.2),
             ("the time between two states", silent, 0.2),
             ("the time of an order", order, 1.0),
             ("the time of an answer of the dashboard", dashboard, 5.0),
-        ];
-        times
-            .into_iter()
-            .try_for_each(|(what, time, most)| within(what, time.as_secs_f64(), 0.01, most, "s"))
+        ]
+        .map(|(what, time, most)| (what, time.as_secs_f64(), 0.01, most, " s"));
+        check_parameters(numbers.into_iter().chain(times)).map_err(UrError::Parameters)
     }
 }
 

@@ -363,6 +363,25 @@ impl ArmError {
     }
 }
 
+/// Refuses the parameters of an arm if one is out of its range.
+///
+/// - `parameters`: name, value, minimum, maximum, and unit with a space in front, if it has one.
+///
+/// # Errors
+/// [`ArmError::Refused`]
+pub fn check_parameters(
+    parameters: impl IntoIterator<Item = (&'static str, f64, f64, f64, &'static str)>,
+) -> Result<(), ArmError> {
+    // NaN is in no range
+    let wrong = parameters
+        .into_iter()
+        .find(|(_, value, low, high, _)| !(low..=high).contains(&value));
+    wrong.map_or(Ok(()), |(what, value, low, high, unit)| {
+        let reason = format!("{what} is {value}{unit}; it must be from {low} to {high}{unit}");
+        Err(ArmError::refused("its parameters", reason))
+    })
+}
+
 /// An arm that holds a probe.
 pub trait Arm {
     /// Waits for the next state.

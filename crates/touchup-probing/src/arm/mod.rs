@@ -27,7 +27,7 @@ pub use bodies::{ArmBodies, Link};
 pub use capsule::Capsule;
 pub use freshness::Freshness;
 pub use geometry::ArmGeometry;
-pub use interface::{Arm, ArmError, ArmState, Command, Safety, SpeedReduction};
+pub use interface::{Arm, ArmError, ArmState, Command, Safety, SpeedReduction, check_parameters};
 pub(crate) use joints::largest_turn;
 pub use joints::{Joints, MOST_JOINTS};
 pub use kinematics::UrGeometry;
