@@ -264,7 +264,13 @@ mod tests {
     use super::*;
     use crate::colour_vision::least_difference;
     use crate::node::feature_messages;
-    use touchup_geometry::mesh::TriMesh;
+    use std::sync::Arc;
+    use touchup_geometry::mesh::{FaceTree, TriMesh};
+
+    fn untouched(scan: TriMesh) -> MeshVersion {
+        let tree = FaceTree::new(&scan);
+        MeshVersion::of(Arc::new((scan, tree)), "object", "test", f32::NAN)
+    }
 
     #[test]
     fn states_and_the_features_before_them_are_apart_without_red_and_green() {
@@ -300,7 +306,7 @@ mod tests {
             strip.collect(),
         )
         .unwrap();
-        let mesh = MeshVersion::of(&mesh, "object", "test", f32::NAN);
+        let mesh = untouched(mesh);
         let mut tiles = Tiles::all_of(&mesh);
         let mut sent = Vec::new();
         let take = |tiles: &mut Tiles, sent: &mut Vec<u32>| {
@@ -349,10 +355,7 @@ mod tests {
         )
         .unwrap();
         let first = TriMesh::new(vec![corner(0), corner(1), corner(2)], vec![[0, 1, 2]]).unwrap();
-        let [whole, none] = [
-            MeshVersion::of(&mesh, "object", "test", f32::NAN),
-            MeshVersion::of(&first, "object", "test", f32::NAN),
-        ];
+        let [whole, none] = [mesh, first].map(untouched);
         let mut tiles = Tiles::all_of(&whole);
         let begun = Instant::now();
         let mut at = |seconds: u64, mesh: &MeshVersion, changed: &[u32]| {

@@ -28,8 +28,32 @@ pub struct MeshCursor {
 struct FollowedIds {
     /// changes not yet in [`PendingChange`]
     changed: IdSet,
-    /// for each number, whether the follower has it
-    had: Vec<bool>,
+    /// numbers that the follower has
+    had: IdBits,
+}
+
+/// A bit for each id.
+#[derive(Debug, Default)]
+struct IdBits(Vec<u64>);
+
+impl IdBits {
+    fn has(&self, id: u32) -> bool {
+        let word = self.0.get(id as usize / 64);
+        word.is_some_and(|word| word >> (id % 64) & 1 == 1)
+    }
+
+    /// Sets a bit; returns its previous state.
+    fn replace(&mut self, id: u32, is_there: bool) -> bool {
+        let (word, bit) = (id as usize / 64, 1 << (id % 64));
+        if word >= self.0.len() {
+            self.0.resize(word + 1, 0);
+        }
+        let was = self.0[word] & bit != 0;
+        if was != is_there {
+            self.0[word] ^= bit;
+        }
+        was
+    }
 }
 
 /// A change in the order of its messages: a face comes after its corners, and a vertex goes after
@@ -45,10 +69,11 @@ struct PendingChange {
 impl FollowedIds {
     /// All that is there.
     fn of(slots: u32, is_there: impl Fn(u32) -> bool) -> Self {
-        Self {
-            changed: IdSet::default(),
-            had: (0..slots).map(is_there).collect(),
-        }
+        let mut all = Self::default();
+        (0..slots).filter(|&id| is_there(id)).for_each(|id| {
+            all.had.replace(id, true);
+        });
+        all
     }
 
     /// Changed numbers that are there, and the others.
@@ -57,20 +82,11 @@ impl FollowedIds {
         self.changed.take(usize::MAX, |id| {
             if is_there(id) {
                 set.push(id);
-            } else if self.had.get(id as usize) == Some(&true) {
+            } else if self.had.has(id) {
                 removed.push(id);
             }
         });
         [set, removed]
-    }
-
-    /// Notes that the follower gets or loses a number; returns whether it had it.
-    fn set(&mut self, id: u32, is_there: bool) -> bool {
-        let at = id as usize;
-        if at >= self.had.len() {
-            self.had.resize(at + 1, false);
-        }
-        std::mem::replace(&mut self.had[at], is_there)
     }
 }
 
@@ -212,10 +228,10 @@ impl MeshCursor {
         patch.removed_faces = taken(&mut change.removed_faces);
         patch
             .removed_faces
-            .retain(|&face| mesh.face(face).is_none() && faces.set(face, false));
+            .retain(|&face| mesh.face(face).is_none() && faces.had.replace(face, false));
         for vertex in taken(&mut change.vertices) {
             if let Some((position, support)) = mesh.vertex(vertex) {
-                vertices.set(vertex, true);
+                vertices.had.replace(vertex, true);
                 patch.vertices.push(vertex);
                 patch
                     .positions
@@ -226,7 +242,7 @@ impl MeshCursor {
         }
         for face in taken(&mut change.faces) {
             if let Some(corners) = mesh.face(face) {
-                faces.set(face, true);
+                faces.had.replace(face, true);
                 patch.faces.push(face);
                 patch.corners.extend(corners);
             }
@@ -234,7 +250,7 @@ impl MeshCursor {
         patch.removed_vertices = taken(&mut change.removed_vertices);
         patch
             .removed_vertices
-            .retain(|&vertex| mesh.vertex(vertex).is_none() && vertices.set(vertex, false));
+            .retain(|&vertex| mesh.vertex(vertex).is_none() && vertices.had.replace(vertex, false));
         patch
     }
 }
@@ -254,6 +270,7 @@ pub(super) mod tests {
 
     use nalgebra::Point3;
 
+    use super::super::version::tests::scan;
     use super::*;
     use touchup_geometry::mesh::TriMesh;
 
@@ -302,7 +319,7 @@ pub(super) mod tests {
         let place = |i: u32| Point3::new(f64::from(i), f64::from(i % 2), 0.0);
         let faces = (0..vertices - 2).map(|i| [i, i + 1, i + 2]).collect();
         let mesh = TriMesh::new((0..vertices).map(place).collect(), faces).unwrap();
-        MeshVersion::of(&mesh, "object", "a", f32::NAN)
+        MeshVersion::of(scan(mesh), "object", "a", f32::NAN)
     }
 
     fn moved(version: u64, vertex: u32, x: f64) -> Edits {
@@ -385,6 +402,32 @@ pub(super) mod tests {
         for cursor in [&mut cursor, &mut joined] {
             assert!(cursor.next_part(&mesh, 99, 10).is_none());
         }
+    }
+
+    #[test]
+    fn only_numbers_of_the_follower_go_and_each_once() {
+        let mut mesh = fan(200);
+        let mut cursor = MeshCursor::at(&mesh);
+        let mut gone = Edits::default();
+        (gone.version, gone.is_complete) = (2, true);
+        // the last two were never there
+        gone.faces = [0, 63, 64, 197, 198, 256].map(|face| (face, None)).to_vec();
+        for version in [2, 3] {
+            gone.version = version;
+            apply(&mut mesh, &mut cursor, &gone);
+        }
+        let mut patch = cursor.next_part(&mesh, 3, 1000).unwrap();
+        patch.removed_faces.sort_unstable();
+        assert_eq!(patch.removed_faces, [0, 63, 64, 197]);
+        gone.version = 4;
+        apply(&mut mesh, &mut cursor, &gone);
+        assert!(
+            cursor
+                .next_part(&mesh, 4, 1000)
+                .unwrap()
+                .removed_faces
+                .is_empty()
+        );
     }
 
     #[test]

@@ -1,10 +1,12 @@
 //! The feed of the mesh: one version for all followers, and a cursor for each of them.
 //!
-//! One writer applies the changes from the journal of the mesh. Readers hold a version that no
-//! longer changes; the writer copies it only if a reader still holds it at the next change.
+//! One writer applies the changes from the journal of the mesh, as blocks over the scan. Readers
+//! hold a version that no longer changes; of what they still hold at the next change, the writer
+//! copies the blocks that change.
 //! Followers take messages with their missing vertices and faces at their own pace: a backlog is a
 //! set of ids, bounded by the mesh, so a slow follower skips versions and delays nobody.
 
+mod blocks;
 mod cursor;
 mod edits;
 mod version;
@@ -16,7 +18,7 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex};
 
 pub use self::cursor::MeshCursor;
-pub use self::edits::{Edits, FACES_OF_A_TILE, VertexPlace};
+pub use self::edits::{Edits, FACES_OF_A_TILE};
 pub use self::version::MeshVersion;
 use crate::ros::locked;
 use crate::ros::messages::MeshPatch;
@@ -30,7 +32,6 @@ type Revision = (u64, u64);
 #[derive(Debug)]
 pub struct MeshFeed {
     clock: Clock,
-    scan: Arc<(TriMesh, FaceTree)>,
     state: Mutex<FeedState>,
     /// last complete state on its way to the writer, or with it
     announced: Mutex<Revision>,
@@ -66,7 +67,7 @@ impl MeshFeed {
     ) -> Self {
         let scan_variance = scan_sigma.map_or(f32::NAN, |sigma| (sigma * sigma) as f32);
         let state = FeedState {
-            mesh: Arc::new(MeshVersion::of(&scan.0, frame, "", scan_variance)),
+            mesh: Arc::new(MeshVersion::of(scan, frame, "", scan_variance)),
             session: 0,
             is_complete: true,
             is_closed: false,
@@ -76,7 +77,6 @@ impl MeshFeed {
         };
         Self {
             clock,
-            scan,
             state: Mutex::new(state),
             announced: Mutex::new((0, 1)),
             version: AtomicU64::new(1),
@@ -125,8 +125,7 @@ impl MeshFeed {
 
     /// Switches to another session, which begins with the scan. Followers get its whole state.
     pub fn begin_session(&self, name: &str) {
-        let before = self.now().0;
-        let mesh = MeshVersion::of(&self.scan.0, &before.frame, name, before.scan_variance);
+        let mesh = self.now().0.of_session(name);
         let mut state = locked(&self.state);
         for cursor in state.cursors.values_mut() {
             *cursor = MeshCursor::before(&mesh);
@@ -284,14 +283,12 @@ mod tests {
     use nalgebra::Point3;
 
     use super::cursor::tests::PatchReader;
-    use super::version::tests::strip;
+    use super::version::tests::{scan, strip};
     use super::*;
     use touchup_method::reconstruct::Support;
 
     fn feed() -> Arc<MeshFeed> {
-        let scan = strip(10);
-        let tree = FaceTree::new(&scan);
-        let feed = MeshFeed::new(Clock::system(), Arc::new((scan, tree)), "object", None);
+        let feed = MeshFeed::new(Clock::system(), scan(strip(10)), "object", None);
         Arc::new(feed)
     }
 

@@ -1,15 +1,15 @@
-//! The mesh at one version: plain arrays by id.
+//! The mesh at one version: the scan, and blocks of changed vertices and faces over it.
+
+use std::sync::Arc;
 
 use nalgebra::Point3;
 
-use super::edits::Edits;
-use touchup_geometry::mesh::{MeshError, TriMesh, VertexId};
+use super::blocks::Blocks;
+use super::edits::{Edits, VertexPlace};
+use touchup_geometry::mesh::{FaceId, FaceTree, MeshError, TriMesh, VertexId};
 use touchup_method::reconstruct::Support;
 
-/// Corners of a missing face.
-const NO_FACE: [u32; 3] = [u32::MAX; 3];
-
-/// The mesh at one version.
+/// The mesh at one version. A copy shares all that does not change afterwards.
 #[derive(Clone, Debug)]
 pub struct MeshVersion {
     /// frame of the positions
@@ -22,73 +22,119 @@ pub struct MeshVersion {
     pub shape_version: u64,
     /// stamp of the newest sample in it, ns
     pub stamp_ns: i64,
-    positions: Vec<Point3<f64>>,
-    support: Vec<Option<Support>>,
-    /// along the normal, m²; NaN if unknown
-    variance: Vec<f32>,
+    scan: Arc<(TriMesh, FaceTree)>,
     /// variance of vertices on the scan, m²; NaN if unknown
-    pub scan_variance: f32,
-    /// number of faces at each vertex: unused vertices are not shown
-    uses: Vec<u32>,
-    corners: Vec<[u32; 3]>,
+    scan_variance: f32,
+    vertices: Blocks<VertexState>,
+    /// corners; `None`: missing
+    faces: Blocks<Option<[u32; 3]>>,
+    /// largest number of a vertex and of a face, plus one
+    slots: [u32; 2],
     /// numbers of used vertices and of faces
     pub counts: [u32; 2],
+}
+
+/// State of one vertex.
+#[derive(Clone, Copy, Debug)]
+struct VertexState {
+    /// m; of a missing vertex the last one
+    position: Point3<f64>,
+    /// `None`: missing
+    support: Option<Support>,
+    /// along the normal, m²; NaN if unknown
+    variance: f32,
+    /// number of faces at it: unused vertices are not shown
+    uses: u32,
+}
+
+impl VertexState {
+    fn of_scan(scan: &TriMesh, vertex: u32) -> Self {
+        let id = VertexId(vertex);
+        let is_there = scan.has_vertex(id);
+        Self {
+            position: scan
+                .positions()
+                .get(vertex as usize)
+                .copied()
+                .unwrap_or_default(),
+            support: is_there.then_some(Support::Scan),
+            variance: f32::NAN,
+            uses: if is_there {
+                scan.star(id).len() as u32
+            } else {
+                0
+            },
+        }
+    }
+
+    fn place(self) -> Option<VertexPlace> {
+        let support = self.support.filter(|_| self.uses > 0)?;
+        Some((self.position, support))
+    }
+}
+
+fn corners_of_scan(scan: &TriMesh, face: u32) -> Option<[u32; 3]> {
+    let id = FaceId(face);
+    scan.has_face(id)
+        .then(|| scan.corners(id).map(|VertexId(corner)| corner))
 }
 
 impl MeshVersion {
     /// The scan before any touch.
     ///
     /// - `scan_variance`: of its vertices along their normals, m²; NaN if unknown.
-    pub fn of(scan: &TriMesh, frame: &str, session: &str, scan_variance: f32) -> Self {
-        let slots = scan.vertex_slots() as u32;
-        let is_there = |vertex| scan.has_vertex(VertexId(vertex)).then_some(Support::Scan);
-        let mut corners = vec![NO_FACE; scan.face_slots()];
-        let mut uses = vec![0; scan.vertex_slots()];
-        for (face, ours) in scan.faces() {
-            corners[face.0 as usize] = ours.map(|v| v.0);
-            ours.iter().for_each(|v| uses[v.0 as usize] += 1);
-        }
-        let used = uses.iter().filter(|uses| **uses > 0).count();
+    pub fn of(
+        scan: Arc<(TriMesh, FaceTree)>,
+        frame: &str,
+        session: &str,
+        scan_variance: f32,
+    ) -> Self {
+        let mesh = &scan.0;
+        let slots = [mesh.vertex_slots(), mesh.face_slots()].map(|slots| slots as u32);
+        let is_used = |vertex: &u32| VertexState::of_scan(mesh, *vertex).uses > 0;
+        let used = (0..slots[0]).filter(is_used).count();
         Self {
             frame: frame.to_owned(),
             session: session.to_owned(),
             version: 1,
             shape_version: 1,
             stamp_ns: 0,
-            positions: scan.positions().to_vec(),
-            support: (0..slots).map(is_there).collect(),
-            variance: vec![f32::NAN; scan.vertex_slots()],
             scan_variance,
-            uses,
-            corners,
-            counts: [used as u32, scan.face_count() as u32],
+            vertices: Blocks::new(),
+            faces: Blocks::new(),
+            slots,
+            counts: [used as u32, mesh.face_count() as u32],
+            scan,
         }
+    }
+
+    /// The scan before any touch, for another session.
+    pub fn of_session(&self, session: &str) -> Self {
+        Self::of(
+            Arc::clone(&self.scan),
+            &self.frame,
+            session,
+            self.scan_variance,
+        )
     }
 
     /// Applies changes; returns vertices that faces use from now on, or no longer.
     pub fn apply(&mut self, edits: &Edits) -> Vec<u32> {
         for &(vertex, place) in &edits.vertices {
-            self.make_room(vertex);
-            let at = vertex as usize;
-            self.support[at] = place.map(|(_, support)| support);
-            self.variance[at] = f32::NAN;
+            let state = self.vertex_mut(vertex);
+            state.support = place.map(|(_, support)| support);
+            state.variance = f32::NAN;
             if let Some((position, _)) = place {
-                self.positions[at] = position;
+                state.position = position;
             }
         }
         let mut turned = Vec::new();
         for &(face, corners) in &edits.faces {
-            let at = face as usize;
-            if at >= self.corners.len() {
-                self.corners.resize(at + 1, NO_FACE);
-            }
-            let was = std::mem::replace(&mut self.corners[at], corners.unwrap_or(NO_FACE));
-            let was = (was != NO_FACE).then_some(was);
+            let was = std::mem::replace(self.face_mut(face), corners);
             self.counts[1] =
                 self.counts[1] + u32::from(corners.is_some()) - u32::from(was.is_some());
             for vertex in corners.into_iter().flatten() {
-                self.make_room(vertex);
-                let uses = &mut self.uses[vertex as usize];
+                let uses = &mut self.vertex_mut(vertex).uses;
                 *uses += 1;
                 if *uses == 1 {
                     self.counts[0] += 1;
@@ -96,7 +142,7 @@ impl MeshVersion {
                 }
             }
             for vertex in was.into_iter().flatten() {
-                let uses = &mut self.uses[vertex as usize];
+                let uses = &mut self.vertex_mut(vertex).uses;
                 *uses -= 1;
                 if *uses == 0 {
                     self.counts[0] -= 1;
@@ -114,29 +160,32 @@ impl MeshVersion {
     /// Applies variances of vertices, m²; returns the changed vertices.
     pub fn apply_variances(&mut self, version: u64, variances: &[(u32, f32)]) -> Vec<u32> {
         self.version = version;
-        let known = variances
-            .iter()
-            .filter(|(vertex, _)| self.vertex(*vertex).is_some());
-        let known: Vec<_> = known.collect();
-        for &&(vertex, variance) in &known {
-            self.variance[vertex as usize] = variance;
+        let mut changed = Vec::new();
+        for &(vertex, variance) in variances {
+            if self.vertex(vertex).is_some() {
+                self.vertex_mut(vertex).variance = variance;
+                changed.push(vertex);
+            }
         }
-        known.into_iter().map(|(vertex, _)| *vertex).collect()
+        changed
     }
 
-    fn make_room(&mut self, vertex: u32) {
-        let slots = vertex as usize + 1;
-        if slots > self.positions.len() {
-            self.positions.resize(slots, Point3::origin());
-            self.support.resize(slots, None);
-            self.variance.resize(slots, f32::NAN);
-            self.uses.resize(slots, 0);
-        }
+    fn vertex_mut(&mut self, vertex: u32) -> &mut VertexState {
+        self.slots[0] = self.slots[0].max(vertex + 1);
+        let scan = &self.scan.0;
+        self.vertices
+            .get_mut(vertex, |vertex| VertexState::of_scan(scan, vertex))
     }
 
-    /// Largest number of a vertex and of a face, plus one.
-    pub fn slots(&self) -> [u32; 2] {
-        [self.positions.len() as u32, self.corners.len() as u32]
+    fn face_mut(&mut self, face: u32) -> &mut Option<[u32; 3]> {
+        self.slots[1] = self.slots[1].max(face + 1);
+        let scan = &self.scan.0;
+        self.faces.get_mut(face, |face| corners_of_scan(scan, face))
+    }
+
+    fn state(&self, vertex: u32) -> VertexState {
+        let changed = self.vertices.get(vertex);
+        changed.unwrap_or_else(|| VertexState::of_scan(&self.scan.0, vertex))
     }
 
     /// Session, and the version of the shape.
@@ -144,36 +193,40 @@ impl MeshVersion {
         (self.session.clone(), self.shape_version)
     }
 
+    /// Largest number of a vertex and of a face, plus one.
+    pub fn slots(&self) -> [u32; 2] {
+        self.slots
+    }
+
     /// Position of a vertex, m, and its support; `None` for a missing or unused vertex.
-    pub fn vertex(&self, vertex: u32) -> Option<(Point3<f64>, Support)> {
-        let at = vertex as usize;
-        let is_used = self.uses.get(at).is_some_and(|uses| *uses > 0);
-        is_used.then_some((*self.positions.get(at)?, (*self.support.get(at)?)?))
+    pub fn vertex(&self, vertex: u32) -> Option<VertexPlace> {
+        self.state(vertex).place()
     }
 
     /// Variance of a vertex along its normal, m²; NaN if unknown.
     pub fn variance(&self, vertex: u32) -> f32 {
-        let at = vertex as usize;
-        match self.support.get(at) {
-            Some(Some(Support::Scan)) => self.scan_variance,
-            _ => self.variance.get(at).copied().unwrap_or(f32::NAN),
+        match self.state(vertex) {
+            VertexState {
+                support: Some(Support::Scan),
+                ..
+            } => self.scan_variance,
+            state => state.variance,
         }
     }
 
     /// The vertices not supported by the scan: number, position, m, and support.
     pub fn touched(&self) -> impl Iterator<Item = (u32, Point3<f64>, Support)> + '_ {
-        let all = (0..self.positions.len() as u32)
-            .filter_map(|vertex| Some((vertex, self.vertex(vertex)?)));
-        all.filter(|(_, (_, support))| *support != Support::Scan)
-            .map(|(vertex, (place, support))| (vertex, place, support))
+        let all = self.vertices.changed();
+        all.filter_map(|(vertex, state)| {
+            let (position, support) = state.place()?;
+            (support != Support::Scan).then_some((vertex, position, support))
+        })
     }
 
     /// Corners of a face; `None` for a missing one.
     pub fn face(&self, face: u32) -> Option<[u32; 3]> {
-        self.corners
-            .get(face as usize)
-            .copied()
-            .filter(|corners| *corners != NO_FACE)
+        let changed = self.faces.get(face);
+        changed.unwrap_or_else(|| corners_of_scan(&self.scan.0, face))
     }
 
     /// As a mesh of its own: vertices keep their numbers, faces their order.
@@ -181,20 +234,22 @@ impl MeshVersion {
     /// # Errors
     /// [`MeshError`] if faces name missing vertices.
     pub fn mesh(&self) -> Result<TriMesh, MeshError> {
-        let faces = self
-            .corners
-            .iter()
-            .copied()
-            .filter(|corners| *corners != NO_FACE)
-            .collect();
-        TriMesh::new(self.positions.clone(), faces)
+        let [vertices, faces] = self.slots;
+        let positions = (0..vertices).map(|vertex| self.state(vertex).position);
+        let faces = (0..faces).filter_map(|face| self.face(face));
+        TriMesh::new(positions.collect(), faces.collect())
     }
 }
 
 #[cfg(test)]
 pub(super) mod tests {
-    use super::super::edits::VertexPlace;
     use super::*;
+
+    /// A scan with the tree over its faces.
+    pub fn scan(mesh: TriMesh) -> Arc<(TriMesh, FaceTree)> {
+        let tree = FaceTree::new(&mesh);
+        Arc::new((mesh, tree))
+    }
 
     /// A strip of triangles between two rows of `columns` vertices.
     pub fn strip(columns: u32) -> TriMesh {
@@ -218,8 +273,8 @@ pub(super) mod tests {
 
     #[test]
     fn every_change_of_the_mesh_is_in_it() {
-        let scan = strip(1000);
-        let mut mesh = MeshVersion::of(&scan, "object", "some", f32::NAN);
+        let scan = scan(strip(1000));
+        let mut mesh = MeshVersion::of(Arc::clone(&scan), "object", "some", f32::NAN);
         let moved = |i: u32, step: u32| {
             Point3::new(f64::from(i), f64::from(step), f64::from(i * step) * 0.1)
         };
@@ -234,6 +289,7 @@ pub(super) mod tests {
             assert_eq!(mesh.version, if step == 3 { 3 } else { 1 });
         }
         let faces: Vec<_> = scan
+            .0
             .faces()
             .map(|(_, corners)| corners.map(|v| v.0))
             .collect();
