@@ -225,10 +225,10 @@ fn beside_pages(faces: usize, turns: usize) {
                 certificate: None,
             };
             let (scan, session_folder) = ("scan.ply".into(), folder.path().to_owned());
-            let (scan_mesh, mesh_unit) = (ready.scan_mesh(), ready.mesh_unit());
+            let (scan_faces, mesh_unit) = (ready.scan().1, ready.mesh_unit());
             let facts = NodeFacts {
                 scan,
-                scan_mesh,
+                scan_faces,
                 session_folder,
                 nominal: None,
                 nominal_file: None,

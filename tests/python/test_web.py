@@ -22,7 +22,7 @@ from ros_player import in_step
 from ros_process import Process
 from scipy.spatial import cKDTree
 from test_ros_node import CYCLONE
-from web_page import DEVIATION, OUTLIER, PROTOCOL, SIGMA, PageNode, Socket, page_url
+from web_page import DEVIATION, OUTLIER, PROTOCOL, PageNode, Socket, page_url
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 
@@ -281,14 +281,15 @@ def test_pages_have_the_nodes_mesh_however_late_they_join_and_one_that_takes_not
         distances, nearest = cKDTree(theirs).query(ours)
         assert distances.max() < 1e-3 and len(set(nearest)) == len(theirs)
         # how well each vertex is known is what is saved beside it
-        early.take_until(lambda: SIGMA in early.numbers_of and OUTLIER in early.numbers_of)
+        touched = [vertex for vertex in early.vertices if early.support[vertex] == 1]
+        early.take_until(lambda: OUTLIER in early.numbers_of and all(early.variance[vertex] >= 0 for vertex in touched))
         columns = mesh.metadata["_ply_raw"]["vertex"]["data"]
         sigma_of = {tuple(place): sigma for place, sigma in zip(columns_of(columns, "xyz"), columns["sigma_mm"].ravel(), strict=True)}
         tree = cKDTree(list(sigma_of))
-        known = [(vertex, sigma) for vertex, sigma in early.numbers_of[SIGMA].items() if vertex in early.vertices]
-        far, at = tree.query([numpy.array(early.vertices[vertex]) * 1e3 for vertex, _ in known])
-        ratio = numpy.array([sigma * 1e3 for _, sigma in known]) / numpy.array(list(sigma_of.values()))[at]
-        assert far.max() < 1e-3 and len(known) > 1000 and numpy.abs(ratio[early_is_touched(early, known)] - 1).max() < 1e-3
+        far, at = tree.query([numpy.array(early.vertices[vertex]) * 1e3 for vertex in touched])
+        sigmas = numpy.sqrt([early.variance[vertex] for vertex in touched]) * 1e3
+        ratio = sigmas / numpy.array(list(sigma_of.values()))[at]
+        assert far.max() < 1e-3 and len(touched) > 1000 and numpy.abs(ratio - 1).max() < 1e-3
         # deviations are those that libigl finds from the part as it is
         truth = trimesh.load(demo_folder / "truth.ply", process=False)
         measured = {vertex: far for vertex, far in early.numbers_of[DEVIATION].items() if vertex in early.vertices}
@@ -300,13 +301,8 @@ def test_pages_have_the_nodes_mesh_however_late_they_join_and_one_that_takes_not
         assert node.end() in (0, 4), node.text()
 
 
-
 def columns_of(columns, names):
     return numpy.stack([columns[name].ravel() for name in names], axis=1).astype(float)
-
-
-def early_is_touched(page, known):
-    return numpy.array([page.support[vertex] == 1 for vertex, _ in known])
 
 
 def test_a_recording_on_the_page_ends_with_the_result_of_what_was_touched_until_then(touchup_bin, demo_folder, tmp_path):

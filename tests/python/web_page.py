@@ -20,7 +20,7 @@ store.register(get_types_from_msg((ROOT / "msg/msg/MeshPatch.msg").read_text(), 
 PROTOCOL = "touchup.v1"
 # kind 1, a message of DDS in little endian behind its encapsulation
 MESH_PATCH = bytes([1, 0, 0, 0])
-DEVIATION, SIGMA, OUTLIER = 1, 2, 3
+DEVIATION, OUTLIER = 1, 3
 
 
 class PageNode(Node):
@@ -64,9 +64,9 @@ class Socket:
         self.socket = self.opened.enter_context(connect(address, additional_headers=headers, compression=None, **options))
         self.numbers = itertools.count(1)
         self.newest, self.counts, self.answers = {}, {}, {}
-        # by kind: DEVIATION, SIGMA, OUTLIER; then by vertex
+        # by kind: DEVIATION, OUTLIER; then by vertex
         self.numbers_of = {}
-        self.session, self.version, self.vertices, self.faces, self.support = "", 0, {}, {}, {}
+        self.session, self.version, self.vertices, self.faces, self.support, self.variance = "", 0, {}, {}, {}, {}
         # session and version, and its triangles then
         self.known_triangles = None
 
@@ -97,12 +97,13 @@ class Socket:
 
     def take_patch(self, patch):
         if patch.base_version == 0 and patch.part == 0:
-            self.session, self.vertices, self.faces, self.support = patch.session, {}, {}, {}
+            self.session, self.vertices, self.faces, self.support, self.variance = patch.session, {}, {}, {}, {}
         assert patch.session == self.session
         for face in patch.removed_faces.tolist():
             self.faces.pop(face, None)
         self.vertices.update(zip(patch.vertices.tolist(), patch.positions.reshape(-1, 3).tolist(), strict=True))
         self.support.update(zip(patch.vertices.tolist(), patch.support.tolist(), strict=True))
+        self.variance.update(zip(patch.vertices.tolist(), patch.variance.tolist(), strict=True))
         self.faces.update(zip(patch.faces.tolist(), patch.corners.reshape(-1, 3).tolist(), strict=True))
         for vertex in patch.removed_vertices.tolist():
             self.vertices.pop(vertex, None)

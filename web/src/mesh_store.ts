@@ -109,8 +109,7 @@ export class MeshStore {
     for (let i = 0; i < vertices.length; i++) {
       const vertex = vertices[i];
       if (3 * vertex >= this.positions.length) continue;
-      if (which === WHICH.sigma) this.variance[vertex] = numbers[i] >= 0 ? numbers[i] ** 2 : -1;
-      else if (which === WHICH.outlier) this.quality[4 * vertex + QUALITY.outlier] = 1;
+      if (which === WHICH.outlier) this.quality[4 * vertex + QUALITY.outlier] = 1;
       else if (this.deviation !== null) this.deviation[vertex] = Number.isNaN(numbers[i]) ? FAR : numbers[i];
       this.dirtyVertices.mark(vertex);
     }

@@ -10,8 +10,6 @@ const HEAD = 8;
 export const WHICH = {
   /** From the nominal part, m; NaN where that is far. */
   deviation: 1,
-  /** Standard uncertainty along the normal, m. */
-  sigma: 2,
   /** 1 where a contact nearby was rejected; vertices that are not named have none. */
   outlier: 3,
 } as const;

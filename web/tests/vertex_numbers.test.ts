@@ -39,13 +39,10 @@ describe("numbers of vertices", () => {
     expect([...(store.deviation ?? [])]).toEqual([Math.fround(0.001), FAR, FAR]);
   });
 
-  it("are variances where they are standard uncertainties, and marks where contacts were rejected", () => {
+  it("are marks where contacts were rejected", () => {
     const store = new MeshStore();
     store.positions = new Float32Array(9);
-    store.variance = new Float32Array(3).fill(-1);
     store.quality = new Uint8Array(12);
-    store.setNumbers(decodeVertexNumbers(frame([2], [0.5], 2, 2)));
-    expect([...store.variance]).toEqual([-1, -1, 0.25]);
     const marks = () => [0, 1, 2].map((vertex) => store.quality[4 * vertex + QUALITY.outlier]);
     store.setNumbers(decodeVertexNumbers(frame([0, 1], [1, 1], 2, 3)));
     expect([marks(), store.hasOutliers]).toEqual([[1, 1, 0], true]);

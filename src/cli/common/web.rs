@@ -187,7 +187,7 @@ impl WebFlags {
                 None => return Ok((network, None)),
             },
         };
-        let scan = ready.scan().0.to_owned();
+        let (scan, scan_faces) = ready.scan();
         let session_folder = ready
             .folder()
             .parent()
@@ -195,8 +195,8 @@ impl WebFlags {
             .unwrap_or_default();
         let (nominal_file, mesh_unit) = (self.web_nominal.clone(), ready.mesh_unit());
         let facts = NodeFacts {
-            scan,
-            scan_mesh: ready.scan_mesh(),
+            scan: scan.to_owned(),
+            scan_faces,
             // the setup on the page has confirmed it
             is_size_confirmed: was_open,
             session_folder,

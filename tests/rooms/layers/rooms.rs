@@ -80,7 +80,7 @@ pub const MAY_USE: &[(&str, &str)] = &[
     ),
     (
         "page",
-        "clock stylus mesh reconstruct conformity arm diagnose io inspect input_check calibration scan scene session replay \
+        "clock stylus mesh conformity arm diagnose io inspect input_check calibration scan scene session replay \
          threads ros node",
     ),
     ("ros2_control", "clock stylus plan arm scene ros"),

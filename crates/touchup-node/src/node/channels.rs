@@ -5,8 +5,7 @@ use std::sync::mpsc::SyncSender;
 
 use nalgebra::Point3;
 
-use super::variances::VertexVariance;
-use crate::ros::mesh_feed::Edits;
+use crate::ros::mesh_feed::{Edits, VertexCertainty};
 use crate::ros::messages::{
     DetectFeaturesRequest, DetectFeaturesResponse, FlagFeatureResponse, UnflagFeatureResponse,
 };
@@ -20,8 +19,8 @@ use touchup_session::live::TouchDelta;
 pub enum ViewInput {
     /// a change of the mesh
     Edits(Box<Edits>),
-    /// version of the mesh with these variances of vertices
-    Variances(u64, Vec<VertexVariance>),
+    /// version of the mesh with this certainty of its vertices
+    Certainty(u64, VertexCertainty),
     /// name of a new session
     Session(String),
     /// a touched face and its signed distance, m; only with tiles coloured by mismatch

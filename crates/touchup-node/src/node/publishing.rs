@@ -132,12 +132,10 @@ impl RefinementWorker {
         if let Some(refused) = self.edits.take_if(|edits| edits.is_filled()) {
             return Some(refused);
         }
-        let edits_now = self.session.engine.edits();
-        let is_sent = self.session.sent_version == self.session.version
-            && self.session.sent_edits == edits_now;
-        if is_sent {
+        if self.session.is_sent() {
             return None;
         }
+        let edits_now = self.session.engine.edits();
         let mut edits = self.edits.take().or_else(|| self.spare.try_recv().ok())?;
         let stamp_ns = self.session.last_ns.unwrap_or(0);
         let (scan, version) = (&self.setup.input.scan.0, self.session.version);

@@ -10,6 +10,7 @@ use std::time::{Duration, Instant};
 use tracing::warn;
 
 use super::arm::ArmHandle;
+use super::certainty::CertaintyWork;
 use super::channels::{FeatureInput, ViewInput};
 use super::error::NodeError;
 use super::input::acceptance::Acceptance;
@@ -20,7 +21,6 @@ use super::session::{NodeEnd, NodeSession};
 use super::setup::Setup;
 use super::side_work::SideWork;
 use super::take_out::TakingOut;
-use super::variances::VarianceWork;
 use crate::ros::convert::frame_transform;
 use crate::ros::inbox::Arrivals;
 use crate::ros::mesh_feed::Edits;
@@ -49,7 +49,7 @@ const UNREADABLE_EVERY: Duration = Duration::from_secs(10);
 const END_OF_TIME_NS: i64 = (1 << 31) * 1_000_000_000;
 /// Time without samples after which the mesh settles to the state of a saved file. A hand lifts the
 /// stylus for less.
-const SETTLES_AFTER: Duration = Duration::from_millis(500);
+pub(super) const SETTLES_AFTER: Duration = Duration::from_millis(500);
 /// Maximum number of messages of a stream that wait for a transform.
 const MOST_WAITING: usize = 4096;
 
@@ -89,9 +89,11 @@ pub struct RefinementWorker {
     pub(super) side_work: SideWork,
     /// running removal or restoration of a touch
     pub(super) taking_out: Option<TakingOut>,
-    /// computation of variances, for followers of the mesh
-    pub(super) variance: VarianceWork,
+    /// computation of the certainty of vertices, for followers of the mesh
+    pub(super) certainty: CertaintyWork,
     pub(super) sampled: Instant,
+    /// time of the last sample before the last change of the mesh
+    pub(super) moved: Instant,
     edits_sent: Instant,
     pub(super) tip_published: Instant,
     pub(super) mismatch_ns: i64,
@@ -120,7 +122,7 @@ impl RefinementWorker {
             mismatch_rate_hz: setup.shared.parameters().double("mismatch_rate_hz"),
             side_work: SideWork::on(setup.clock.clone()),
             taking_out: None,
-            variance: VarianceWork::default(),
+            certainty: CertaintyWork::default(),
             doubts: InputDoubts::on(&setup.clock),
             moving: setup
                 .pose_frames
@@ -153,6 +155,7 @@ impl RefinementWorker {
             state_since: now,
             endpoints: BTreeMap::new(),
             sampled: now,
+            moved: now,
             edits_sent: now,
             tip_published: now,
             mismatch_ns: i64::MIN,
@@ -207,9 +210,6 @@ impl RefinementWorker {
             }
             Arrival::Matched(endpoint) => self.note_endpoint(endpoint),
             Arrival::Viewers(count) => self.setup.shared.note_viewers(count),
-            Arrival::Evidence(reply) => {
-                reply.send(self.session.engine.copy_patcher().ok().flatten())
-            }
             Arrival::Replay(step, reply) => reply.send(self.replay_step(step)),
             Arrival::Shutdown => return ControlFlow::Break(()),
         }
@@ -420,8 +420,10 @@ impl RefinementWorker {
     /// Gives a changed mesh a new version; sends new touches to the features.
     fn note_changes(&mut self) {
         let edits = self.session.engine.edits();
-        self.session.version +=
-            u64::from(std::mem::replace(&mut self.session.edits, edits) != edits);
+        if std::mem::replace(&mut self.session.edits, edits) != edits {
+            self.session.version += 1;
+            self.moved = self.sampled;
+        }
         if let Some(changes) = self.session.engine.take_probed() {
             self.session.probed.extend(changes);
             self.send_probed();
@@ -449,7 +451,7 @@ impl RefinementWorker {
             }
             self.go_on_taking_out();
             self.send_edits();
-            self.go_on_with_variance(now);
+            self.go_on_with_certainty(now);
             self.send_probed();
             self.retry_waiting();
             if !self.session.keeping.is_replayed() {
@@ -476,6 +478,7 @@ impl RefinementWorker {
         (self.resolver.axes, self.waiting, self.mismatch_ns) = (None, Default::default(), i64::MIN);
         // changes of the previous session do not apply to this one
         self.doubts.restart();
+        self.certainty.restart();
         self.give_up_taking_out("a new session has begun");
         self.edits.iter_mut().for_each(|edits| edits.clear());
         std::mem::replace(&mut self.session, next)

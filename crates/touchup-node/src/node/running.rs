@@ -19,7 +19,6 @@ use crate::ros::mesh_feed::{Edits, MeshFeed};
 use crate::ros::parameters::{ParameterValue, Parameters};
 use crate::ros::port::Port;
 use crate::ros::stop::ALLOW_MOTION;
-use touchup_geometry::mesh::{FaceTree, TriMesh};
 use touchup_io::mesh_file::MeshUnit;
 use touchup_io::session_folder::SessionFolder;
 use touchup_session::clock::Clock;
@@ -107,11 +106,6 @@ impl PreparedNode {
     /// The mesh, for followers in this process.
     pub fn mesh_feed(&self) -> Arc<MeshFeed> {
         Arc::clone(&self.setup.shared.mesh)
-    }
-
-    /// The scan, or its refined region, with the tree over its faces.
-    pub fn scan_mesh(&self) -> Arc<(TriMesh, FaceTree)> {
-        Arc::clone(&self.setup.input.scan)
     }
 
     /// The scene as read.

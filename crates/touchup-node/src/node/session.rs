@@ -229,6 +229,11 @@ impl NodeSession {
         })
     }
 
+    /// Whether all changes of the mesh were sent to the view.
+    pub fn is_sent(&self) -> bool {
+        self.sent_version == self.version && self.sent_edits == self.engine.edits()
+    }
+
     /// Restarts for wrenches in other axes than assumed, before any touch.
     ///
     /// # Errors

@@ -2,7 +2,7 @@
 //! pace.
 
 use std::collections::VecDeque;
-use std::sync::{Arc, Mutex};
+use std::sync::Mutex;
 
 use serde::Serialize;
 use tokio::sync::watch;
@@ -71,21 +71,10 @@ fn keep<M: Clone>(kept: &mut VecDeque<(u64, M)>, number: u64, message: &M) {
     kept.push_back((number, message.clone()));
 }
 
-/// A state of the shape of the mesh: session and version.
-pub(super) type MeshState = (String, u64);
-
-/// Vertex uncertainties and outlier marks at one state, as frames for the pages.
-#[derive(Debug)]
-pub(super) struct UncertaintyFrames {
-    pub state: MeshState,
-    pub frames: Vec<Vec<u8>>,
-}
-
 /// The content that all pages read.
 #[derive(Debug, Default)]
 pub(super) struct Board {
     topics: Mutex<BoardMessages>,
-    known: Mutex<Option<Arc<UncertaintyFrames>>>,
     changes: watch::Sender<()>,
 }
 
@@ -151,17 +140,5 @@ impl Board {
             .iter()
             .find(|feature| feature.id == id)
             .cloned()
-    }
-
-    /// Sets the vertex uncertainties of a state.
-    pub fn set_known(&self, known: UncertaintyFrames) {
-        *locked(&self.known) = Some(Arc::new(known));
-        self.wake();
-    }
-
-    /// The vertex uncertainties, if they are of this state of the mesh.
-    pub fn known(&self, state: &MeshState) -> Option<Arc<UncertaintyFrames>> {
-        let known = locked(&self.known).clone()?;
-        (known.state == *state).then_some(known)
     }
 }

@@ -15,8 +15,9 @@ use tokio::sync::watch;
 use tokio::time::{MissedTickBehavior, interval, timeout};
 
 use super::admission::access::Role;
-use super::board::{MeshState, text_of};
+use super::board::text_of;
 use super::site::Site;
+use super::vertex_numbers::{VertexNumber, frame};
 use crate::ros::messages::MeshPatch;
 use crate::ros::port::Reply;
 
@@ -31,7 +32,7 @@ const MOST_ANSWERS: usize = 64;
 /// Maximum rate of a page's messages, 1/s; hold-to-run beats come 50 times per second.
 const MOST_PER_SECOND: u32 = 200;
 /// Maximum number of vertices, or faces, of one message: 1.4 MB.
-pub(super) const OF_A_MESSAGE: usize = 1 << 16;
+const OF_A_MESSAGE: usize = 1 << 16;
 /// Kind of a binary message: a `MeshPatch`.
 const MESH_PATCH: u8 = 1;
 
@@ -123,8 +124,8 @@ struct SentContent {
     state: String,
     replay: String,
     annotations: String,
-    /// state of the mesh of the sent uncertainties
-    known: MeshState,
+    /// vertices marked as outliers
+    outliers: Arc<[u32]>,
 }
 
 impl SentContent {
@@ -150,6 +151,14 @@ impl SentContent {
         let board = site.board.read(&mut self.seen);
         messages.extend(board.into_iter().map(Message::text));
         messages
+    }
+
+    /// The marks of outliers, if they were evaluated again.
+    fn new_marks(&mut self, site: &Site) -> Option<Vec<u8>> {
+        let outliers = Arc::clone(&site.mesh.now().0.outliers);
+        let sent = std::mem::replace(&mut self.outliers, outliers);
+        let marks = self.outliers.iter().map(|vertex| (*vertex, 1.0));
+        (!Arc::ptr_eq(&sent, &self.outliers)).then(|| frame(VertexNumber::Outlier, marks))
     }
 }
 
@@ -182,15 +191,9 @@ async fn send(
             let frame = tokio::task::spawn_blocking(move || nominal.frame(&patch)).await;
             messages.extend(frame.ok().flatten().map(Message::binary));
         }
-        // uncertainties follow the vertices
-        if !has_more
-            && let Some(known) = site
-                .board
-                .known(&site.mesh.now().0.shape_state())
-                .filter(|known| known.state != sent.known)
-        {
-            sent.known.clone_from(&known.state);
-            messages.extend(known.frames.iter().cloned().map(Message::binary));
+        // marks follow the vertices
+        if !has_more {
+            messages.extend(sent.new_marks(&site).map(Message::binary));
         }
         if signed.elapsed() >= SIGN_OF_LIFE {
             signed = Instant::now();

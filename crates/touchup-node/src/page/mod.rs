@@ -14,7 +14,6 @@ mod connection;
 mod downloads;
 mod error;
 mod http;
-mod knowledge;
 mod page_place;
 mod page_port;
 mod replay;
@@ -56,7 +55,7 @@ use self::site::{ScanShown, Site};
 use crate::ros::inbox::Inbox;
 use crate::ros::mesh_feed::MeshFeed;
 use crate::ros::port::Port;
-use touchup_geometry::mesh::{FaceTree, TriMesh};
+use touchup_geometry::mesh::TriMesh;
 use touchup_io::mesh_file::MeshUnit;
 
 /// Address and access of the page.
@@ -77,8 +76,8 @@ pub struct WebParams {
 pub struct NodeFacts {
     /// file of the scan
     pub scan: PathBuf,
-    /// the scan, m in O, with the tree over its faces
-    pub scan_mesh: Arc<(TriMesh, FaceTree)>,
+    /// its number of faces
+    pub scan_faces: usize,
     /// whether an operator has just confirmed its size on the page
     pub is_size_confirmed: bool,
     /// parent of the session folders
@@ -205,17 +204,15 @@ impl WebServer {
             reports: Reports::new(facts.nominal_file, facts.mesh_unit),
             scan: ScanShown {
                 file,
-                faces: facts.scan_mesh.0.face_count(),
+                faces: facts.scan_faces,
                 is_size_confirmed: facts.is_size_confirmed,
             },
-            scan_mesh: facts.scan_mesh,
             session_folder: facts.session_folder,
             pages: AtomicUsize::new(0),
             replay: None,
         });
         let replays = Replays::new(&self.entrance, &site.session_folder, &self.runtime);
         self.routes.set(http::router(Arc::clone(&site), replays));
-        self.runtime.spawn(knowledge::follow(Arc::clone(&site)));
         Ok(Arc::new(PagePort { network, site }))
     }
 

@@ -18,7 +18,6 @@ use super::reporting::report_work::Reports;
 use crate::ros::inbox::Inbox;
 use crate::ros::mesh_feed::MeshFeed;
 use crate::ros::stop::ArmMotion;
-use touchup_geometry::mesh::{FaceTree, TriMesh};
 
 /// Reason of a refused call during a replay.
 const REPLAYED: &str =
@@ -36,8 +35,6 @@ pub(super) struct Site {
     pub nominal: Option<Arc<Nominal>>,
     pub reports: Reports,
     pub scan: ScanShown,
-    /// with the tree over its faces
-    pub scan_mesh: Arc<(TriMesh, FaceTree)>,
     pub session_folder: PathBuf,
     /// number of open pages
     pub pages: AtomicUsize,

@@ -8,8 +8,6 @@ const VERTEX_NUMBERS: u8 = 2;
 pub(super) enum VertexNumber {
     /// deviation from the nominal part, m; NaN beyond reach
     Deviation = 1,
-    /// standard uncertainty along the normal, m
-    Sigma = 2,
     /// 1 near a rejected contact; vertices that are not named have none
     Outlier = 3,
 }

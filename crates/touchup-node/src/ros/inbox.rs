@@ -87,10 +87,7 @@ pub fn inbox(samples: usize, clock: &Clock) -> (Inbox, Arrivals) {
 fn kind_of(arrival: &Arrival) -> Option<usize> {
     match arrival {
         Arrival::Shutdown => None,
-        Arrival::Call(_)
-        | Arrival::SetParameter(..)
-        | Arrival::Evidence(_)
-        | Arrival::Replay(..) => Some(1),
+        Arrival::Call(_) | Arrival::SetParameter(..) | Arrival::Replay(..) => Some(1),
         _ => Some(0),
     }
 }

@@ -5,13 +5,11 @@
 //! and a request carries the closure that answers it.
 
 use std::fmt;
-use std::sync::mpsc::Receiver;
 use std::time::Instant;
 
 use crate::ros::messages::*;
 use crate::ros::parameters::ParameterValue;
 use touchup_io::recording::LiveMessage;
-use touchup_method::reconstruct::Patcher;
 
 /// Number of latest tiles that a port keeps for late joiners, and maximum number in flight: 4 MB.
 pub const TILES_KEPT: usize = 64;
@@ -45,9 +43,6 @@ pub enum Arrival {
     Matched(Endpoint),
     /// number of listeners to `mesh`; one if the port does not know
     Viewers(usize),
-    /// a request for the certainty of the mesh: a copy of the evidence, once it is made; `None`
-    /// without touches
-    Evidence(Reply<Option<Receiver<Patcher>>>),
     /// end or restart of a replayed session; answered after completion
     Replay(ReplayStep, Reply<Result<(), String>>),
     /// a request to end the process

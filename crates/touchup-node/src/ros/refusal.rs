@@ -70,7 +70,6 @@ impl Arrival {
         match self {
             Self::Call(call) => call.refuse(code, why),
             Self::SetParameter(_, _, reply) => reply.send(Err(why.to_owned())),
-            Self::Evidence(reply) => reply.send(None),
             Self::Replay(_, reply) => reply.send(Err(why.to_owned())),
             _ => {}
         }

@@ -20,7 +20,7 @@ use touchup::ros::messages::{
     TransformStamped, UndoRequest, UnflagFeatureRequest,
 };
 use touchup::ros::parameters::ParameterValue;
-use touchup::ros::port::{ArmOrder, Arrival, Call, Publication};
+use touchup::ros::port::{ArmOrder, Arrival, Call, Endpoint, Publication};
 use touchup::stylus::{Message, StampedPose};
 
 /// What was taken is on the disk after so long.
@@ -225,6 +225,58 @@ fn a_follower_that_loses_messages_ends_with_the_mesh() {
         follower.session,
         end.folder.file_name().unwrap().to_str().unwrap()
     );
+}
+
+/// The same pose and wrench again and again, from this stamp on: 3 s at 500 Hz.
+fn still_messages(before: &[Message], from_ns: i64) -> Vec<Message> {
+    let is_pose = |message: &&Message| matches!(message, Message::Pose(_));
+    let pose = before.iter().find(is_pose).unwrap();
+    let wrench = before.iter().find(|message| !is_pose(message)).unwrap();
+    let at = |message: &Message, stamp_ns: i64| {
+        let mut message = *message;
+        match &mut message {
+            Message::Pose(pose) => pose.stamp_ns = stamp_ns,
+            Message::Wrench(wrench) => wrench.stamp_ns = stamp_ns,
+        }
+        message
+    };
+    let stamps = (1..1500).map(|k| from_ns + k * 2_000_000);
+    let messages = stamps.flat_map(|stamp_ns| [pose, wrench].map(|one| at(one, stamp_ns)));
+    messages.collect()
+}
+
+/// The mesh rests a second after its last change. Samples in free air only keep it from settling:
+/// here the stylus waits where the recording began.
+#[test]
+fn touched_vertices_are_known_while_samples_in_free_air_go_on_and_after_them() {
+    let plate = Plate::touched(0.1);
+    let mut bench = Bench::start(&plate);
+    bench.world.arrive_patiently(Arrival::Matched(Endpoint {
+        topic: "/mesh_patch".to_owned(),
+        count: 1,
+        mismatch: None,
+    }));
+    let (mut follower, mut seen) = (Follower::of(&plate.scan), 0);
+    let mut unknown_and_touched = |bench: &mut Bench| {
+        let sent = patches(bench.published());
+        for patch in &sent[seen..] {
+            follower.take(patch);
+        }
+        seen = sent.len();
+        let touched = follower.known.values();
+        let touched = touched.filter(|(support, _)| *support != MeshPatch::SUPPORT_SCAN);
+        let is_unknown = |(_, variance): &&(u8, u32)| f32::from_bits(*variance).is_nan();
+        [touched.clone().filter(is_unknown).count(), touched.count()]
+    };
+    bench.play(&plate.messages);
+    let last_ns = plate.messages.last().unwrap().stamp_ns();
+    bench.play(&still_messages(&plate.messages, last_ns));
+    let [unknown, touched] = unknown_and_touched(&mut bench);
+    assert!(unknown == 0 && touched > 100, "{unknown} of {touched}");
+    // the mesh has settled to that of a file
+    bench.pass(Duration::from_secs(3));
+    let [unknown, touched] = unknown_and_touched(&mut bench);
+    assert!(unknown == 0 && touched > 100, "{unknown} of {touched}");
 }
 
 fn triangle(points: &[Point]) -> [[f32; 3]; 3] {

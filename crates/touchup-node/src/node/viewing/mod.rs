@@ -1,4 +1,4 @@
-//! The mesh for viewers, its variances, and the tip.
+//! The mesh for viewers, and the tip.
 
 pub mod tiles;
 pub mod tip;

@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicUsize;
 
-use tokio::runtime::Handle;
 use tokio::sync::watch;
 
 use super::recording::SessionRecording;
@@ -14,7 +13,6 @@ use crate::page::admission::entrance::Entrance;
 use crate::page::annotations::Annotations;
 use crate::page::board::Board;
 use crate::page::calls::Calls;
-use crate::page::knowledge;
 use crate::page::page_port::PagePort;
 use crate::page::replay_state::ReplayControl;
 use crate::page::replay_state::ReplayNext;
@@ -48,7 +46,6 @@ pub(super) struct Player {
     pub session_folder: PathBuf,
     pub entrance: Arc<Entrance>,
     pub control: Arc<ReplayControl>,
-    pub runtime: Handle,
     pub opened: watch::Sender<OpenedReplay>,
 }
 
@@ -65,10 +62,7 @@ impl Player {
     /// Plays until no page follows.
     pub fn run(self) {
         let Self {
-            control,
-            runtime,
-            opened,
-            ..
+            control, opened, ..
         } = &self;
         let ReplayStage {
             recording,
@@ -80,12 +74,10 @@ impl Player {
             Ok(stage) => stage,
             Err(why) => return drop(opened.send_replace(Some(Err(why)))),
         };
-        let known = runtime.spawn(knowledge::follow(Arc::clone(&site)));
         opened.send_replace(Some(Ok(site)));
         if let Err(why) = play(&recording, control, &stylus) {
             control.fail(why);
         }
-        known.abort();
         inbox.put(Arrival::Shutdown);
         if let Err(error) = node.join() {
             tracing::warn!(%error, session = control.session(), "a replay ended by a fault");
@@ -166,7 +158,6 @@ impl Player {
         scan: &Path,
         mesh_unit: MeshUnit,
     ) -> Result<Arc<Site>, String> {
-        let scan_mesh = ready.scan_mesh();
         let file = scan
             .file_name()
             .map(|name| name.to_string_lossy().into_owned())
@@ -183,10 +174,9 @@ impl Player {
             reports: Reports::new(None, mesh_unit),
             scan: ScanShown {
                 file,
-                faces: scan_mesh.0.face_count(),
+                faces: ready.scan().1,
                 is_size_confirmed: true,
             },
-            scan_mesh,
             session_folder: self.session_folder.clone(),
             pages: AtomicUsize::new(0),
             replay: Some(Arc::clone(&self.control)),

@@ -89,7 +89,6 @@ impl Replays {
             session_folder: self.session_folder.clone(),
             entrance: Arc::clone(&self.entrance),
             control: Arc::clone(&control),
-            runtime: self.runtime.clone(),
             opened: to,
         };
         let places = Arc::clone(&self.places);

@@ -15,6 +15,15 @@ pub const FACES_OF_A_TILE: u32 = 500;
 /// Position of a vertex, m, in O, and its support.
 pub type VertexPlace = (Point3<f64>, Support);
 
+/// Certainty of the touched vertices of one version.
+#[derive(Clone, Debug, Default)]
+pub struct VertexCertainty {
+    /// changed variances along the normal, m², by vertex
+    pub variances: Vec<(u32, f32)>,
+    /// vertices beside a rejected contact
+    pub outliers: Vec<u32>,
+}
+
 /// A list of changes.
 #[derive(Clone, Debug, Default)]
 pub struct Edits {

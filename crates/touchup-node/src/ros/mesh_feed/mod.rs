@@ -13,12 +13,12 @@ mod version;
 
 use std::collections::BTreeMap;
 use std::ops::Deref;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex};
 
 pub use self::cursor::MeshCursor;
-pub use self::edits::{Edits, FACES_OF_A_TILE};
+pub use self::edits::{Edits, FACES_OF_A_TILE, VertexCertainty};
 pub use self::version::MeshVersion;
 use crate::ros::locked;
 use crate::ros::messages::MeshPatch;
@@ -37,6 +37,7 @@ pub struct MeshFeed {
     announced: Mutex<Revision>,
     version: AtomicU64,
     shape_version: AtomicU64,
+    follower_count: AtomicUsize,
 }
 
 #[derive(Debug)]
@@ -81,6 +82,7 @@ impl MeshFeed {
             announced: Mutex::new((0, 1)),
             version: AtomicU64::new(1),
             shape_version: AtomicU64::new(1),
+            follower_count: AtomicUsize::new(0),
         }
     }
 
@@ -113,10 +115,10 @@ impl MeshFeed {
         self.answer(&mut state);
     }
 
-    /// Applies variances of vertices along their normals, m², as the next version.
-    pub fn apply_variances(&self, version: u64, variances: &[(u32, f32)]) {
+    /// Applies the certainty of vertices, as the next version if variances change.
+    pub fn apply_certainty(&self, version: u64, certainty: VertexCertainty) {
         let mut state = locked(&self.state);
-        let changed = Arc::make_mut(&mut state.mesh).apply_variances(version, variances);
+        let changed = Arc::make_mut(&mut state.mesh).apply_certainty(version, certainty);
         for cursor in state.cursors.values_mut() {
             cursor.note_vertices(&changed);
         }
@@ -150,6 +152,11 @@ impl MeshFeed {
     /// The version of the current shape: later ones only change variances.
     pub fn shape_version(&self) -> u64 {
         self.shape_version.load(Ordering::Relaxed)
+    }
+
+    /// Number of followers.
+    pub fn follower_count(&self) -> usize {
+        self.follower_count.load(Ordering::Relaxed)
     }
 
     /// The current state, and whether it is complete.
@@ -192,6 +199,8 @@ impl MeshFeed {
         state.followers += 1;
         let (number, cursor) = (state.followers, cursor(&state.mesh));
         state.cursors.insert(number, cursor);
+        self.follower_count
+            .store(state.cursors.len(), Ordering::Relaxed);
         MeshFollower {
             feed: Arc::clone(self),
             number,
@@ -259,7 +268,11 @@ impl MeshFollower {
 
 impl Drop for MeshFollower {
     fn drop(&mut self) {
-        locked(&self.feed.state).cursors.remove(&self.number);
+        let cursors = &mut locked(&self.feed.state).cursors;
+        cursors.remove(&self.number);
+        self.feed
+            .follower_count
+            .store(cursors.len(), Ordering::Relaxed);
     }
 }
 
@@ -336,18 +349,23 @@ mod tests {
             .vertices
             .extend([(0, touched(1.0)), (1, touched(2.0)), (500, touched(3.0))]);
         feed.apply(&moved);
-        let numbers: Vec<u32> = feed.now().0.touched().map(|(vertex, ..)| vertex).collect();
+        let numbers: Vec<u32> = feed.now().0.touched().map(|(vertex, _)| vertex).collect();
         assert_eq!(numbers, [0, 1], "no face uses the last");
         feed.announce(3);
         let waiting = feed.complete();
         let follower = feed.follow_from_now();
-        feed.apply_variances(3, &[(0, 1e-10), (1, 4e-10), (500, 1e-10)]);
+        let known = |outliers: &[u32]| VertexCertainty {
+            variances: vec![(0, 1e-10), (1, 4e-10), (500, 1e-10)],
+            outliers: outliers.to_vec(),
+        };
+        feed.apply_certainty(3, known(&[1]));
         let sent = follower.next_part(1000).unwrap();
         assert_eq!(
             (sent.vertices, waiting.try_recv().unwrap().version),
             (vec![0, 1], 3)
         );
         assert_eq!((feed.version(), feed.shape_version()), (3, 2));
+        assert_eq!(*feed.now().0.outliers, [1]);
         let mut again = version(4, true);
         again.vertices.push((1, touched(2.5)));
         feed.apply(&again);
@@ -425,7 +443,7 @@ mod tests {
             (reader.vertices[&0], reader.vertices[&1]),
             ([5.0; 3], [5.0; 3])
         );
-        assert_eq!((reader.version, feed.now().0.shape_state().1), (2, 2));
+        assert_eq!((reader.version, feed.shape_version()), (2, 2));
     }
 
     #[test]
@@ -463,7 +481,10 @@ mod tests {
     #[test]
     fn a_follower_that_left_is_noted_no_more() {
         let feed = feed();
-        drop([feed.follow(), feed.follow_from_now()]);
+        let followers = [feed.follow(), feed.follow_from_now()];
+        assert_eq!(feed.follower_count(), 2);
+        drop(followers);
+        assert_eq!(feed.follower_count(), 0);
         assert!(locked(&feed.state).cursors.is_empty());
     }
 }

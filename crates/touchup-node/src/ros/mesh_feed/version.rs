@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::Point3;
 
 use super::blocks::Blocks;
-use super::edits::{Edits, VertexPlace};
+use super::edits::{Edits, VertexCertainty, VertexPlace};
 use touchup_geometry::mesh::{FaceId, FaceTree, MeshError, TriMesh, VertexId};
 use touchup_method::reconstruct::Support;
 
@@ -32,6 +32,8 @@ pub struct MeshVersion {
     slots: [u32; 2],
     /// numbers of used vertices and of faces
     pub counts: [u32; 2],
+    /// vertices beside a rejected contact, as of the last variances
+    pub outliers: Arc<[u32]>,
 }
 
 /// State of one vertex.
@@ -104,6 +106,7 @@ impl MeshVersion {
             faces: Blocks::new(),
             slots,
             counts: [used as u32, mesh.face_count() as u32],
+            outliers: Arc::default(),
             scan,
         }
     }
@@ -157,11 +160,12 @@ impl MeshVersion {
         turned
     }
 
-    /// Applies variances of vertices, m²; returns the changed vertices.
-    pub fn apply_variances(&mut self, version: u64, variances: &[(u32, f32)]) -> Vec<u32> {
+    /// Applies the certainty of vertices; returns the changed vertices.
+    pub fn apply_certainty(&mut self, version: u64, certainty: VertexCertainty) -> Vec<u32> {
         self.version = version;
+        self.outliers = certainty.outliers.into();
         let mut changed = Vec::new();
-        for &(vertex, variance) in variances {
+        for (vertex, variance) in certainty.variances {
             if self.vertex(vertex).is_some() {
                 self.vertex_mut(vertex).variance = variance;
                 changed.push(vertex);
@@ -188,11 +192,6 @@ impl MeshVersion {
         changed.unwrap_or_else(|| VertexState::of_scan(&self.scan.0, vertex))
     }
 
-    /// Session, and the version of the shape.
-    pub fn shape_state(&self) -> (String, u64) {
-        (self.session.clone(), self.shape_version)
-    }
-
     /// Largest number of a vertex and of a face, plus one.
     pub fn slots(&self) -> [u32; 2] {
         self.slots
@@ -215,12 +214,10 @@ impl MeshVersion {
     }
 
     /// The vertices not supported by the scan: number, position, m, and support.
-    pub fn touched(&self) -> impl Iterator<Item = (u32, Point3<f64>, Support)> + '_ {
+    pub fn touched(&self) -> impl Iterator<Item = (u32, VertexPlace)> + '_ {
         let all = self.vertices.changed();
-        all.filter_map(|(vertex, state)| {
-            let (position, support) = state.place()?;
-            (support != Support::Scan).then_some((vertex, position, support))
-        })
+        all.filter_map(|(vertex, state)| Some((vertex, state.place()?)))
+            .filter(|(_, (_, support))| *support != Support::Scan)
     }
 
     /// Corners of a face; `None` for a missing one.
