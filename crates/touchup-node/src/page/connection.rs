@@ -180,16 +180,13 @@ async fn send(
         messages.extend(sent.changes(&site, role));
         let mesh = follower.next_part(OF_A_MESSAGE);
         let has_more = mesh.is_some();
-        // a copy only for the comparison with a nominal part
-        let deviations = site
-            .nominal
-            .clone()
-            .and_then(|nominal| Some((nominal, mesh.clone()?)));
-        messages.extend(mesh.and_then(|patch| Some(Message::binary(frame_of(&patch)?))));
-        if let Some((nominal, patch)) = deviations {
-            // 1 ms per thousand vertices, which must not delay other pages
-            let frame = tokio::task::spawn_blocking(move || nominal.frame(&patch)).await;
-            messages.extend(frame.ok().flatten().map(Message::binary));
+        if let Some(patch) = mesh {
+            messages.extend(frame_of(&patch).map(Message::binary));
+            if let Some(nominal) = site.nominal.clone() {
+                // 1 ms per thousand vertices, which must not delay other pages
+                let frame = tokio::task::spawn_blocking(move || nominal.frame(&patch)).await;
+                messages.extend(frame.ok().flatten().map(Message::binary));
+            }
         }
         // marks follow the vertices
         if !has_more {

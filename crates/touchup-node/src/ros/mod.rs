@@ -11,7 +11,7 @@ pub mod dds;
 pub(crate) mod exchange;
 pub mod in_process;
 pub mod inbox;
-pub mod mesh_feed;
+pub(crate) mod mesh_feed;
 pub mod messages;
 pub mod names;
 mod parameter_services;
@@ -31,6 +31,7 @@ pub use arm_samples::ArmSamples;
 #[cfg(all(feature = "ros", any(not(feature = "r2r"), feature = "r2r-check")))]
 pub use dds::{arm_port, samples, start};
 pub use exchange::RosError;
+pub use mesh_feed::MeshFeed;
 
 /// Locks a mutex. A poisoned value is still whole: none of our code panics while it holds the lock.
 pub(crate) fn locked<T>(mutex: &std::sync::Mutex<T>) -> std::sync::MutexGuard<'_, T> {

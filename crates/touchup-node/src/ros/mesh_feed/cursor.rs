@@ -3,14 +3,15 @@
 
 use std::vec::IntoIter;
 
-use super::edits::Edits;
+use super::edits::FaceEdit;
 use super::version::MeshVersion;
 use crate::ros::clock::time;
 use crate::ros::messages::{Header, MeshPatch};
 use touchup_geometry::mesh::IdSet;
 use touchup_method::reconstruct::Support;
 
-/// The place of a follower in the versions of the mesh.
+/// The place of a follower in the versions of the mesh. A new follower without any data gets the
+/// whole state first.
 #[derive(Debug, Default)]
 pub struct MeshCursor {
     /// version of the follower; 0: it has nothing
@@ -77,7 +78,13 @@ impl FollowedIds {
     }
 
     /// Changed numbers that are there, and the others.
-    fn take(&mut self, is_there: impl Fn(u32) -> bool) -> [Vec<u32>; 2] {
+    ///
+    /// - `all`: number of slots, for a new follower, to which everything is a change.
+    fn take(&mut self, all: Option<u32>, is_there: impl Fn(u32) -> bool) -> [Vec<u32>; 2] {
+        if let Some(slots) = all {
+            self.changed = IdSet::default();
+            return [(0..slots).filter(|&id| is_there(id)).collect(), Vec::new()];
+        }
         let (mut set, mut removed) = (Vec::new(), Vec::new());
         self.changed.take(usize::MAX, |id| {
             if is_there(id) {
@@ -114,38 +121,18 @@ impl MeshCursor {
         }
     }
 
-    /// A follower without any data, with the whole of this version to come.
-    pub fn before(mesh: &MeshVersion) -> Self {
-        let [vertices, faces] = mesh.slots();
-        let mut cursor = Self::default();
-        (0..vertices)
-            .filter(|&vertex| mesh.vertex(vertex).is_some())
-            .for_each(|vertex| cursor.vertices.changed.insert(vertex));
-        (0..faces)
-            .filter(|&face| mesh.face(face).is_some())
-            .for_each(|face| cursor.faces.changed.insert(face));
-        cursor
-    }
-
     /// Version of the follower.
     pub fn version(&self) -> u64 {
         self.version
     }
 
-    /// Notes changes of the mesh.
-    pub fn note(&mut self, edits: &Edits) {
-        for (vertex, _) in &edits.vertices {
-            self.vertices.changed.insert(*vertex);
-        }
-        for (face, _) in &edits.faces {
-            self.faces.changed.insert(*face);
-        }
-    }
-
-    /// Notes changes of vertices other than their position.
-    pub fn note_vertices(&mut self, vertices: &[u32]) {
+    /// Notes changed vertices and faces.
+    pub fn note(&mut self, vertices: &[u32], faces: &[FaceEdit]) {
         for vertex in vertices {
             self.vertices.changed.insert(*vertex);
+        }
+        for (face, _) in faces {
+            self.faces.changed.insert(*face);
         }
     }
 
@@ -175,7 +162,7 @@ impl MeshCursor {
         (patch.part, patch.part_count) = (self.parts, self.parts + 1 + left.div_ceil(most) as u32);
         if left == 0 {
             (self.version, self.parts) = (version, 0);
-            // the lists of a whole state are large
+            // its lists may be large
             self.change = PendingChange::default();
         } else {
             self.parts += 1;
@@ -188,9 +175,12 @@ impl MeshCursor {
     }
 
     fn begin_change(&mut self, mesh: &MeshVersion) {
-        let [vertices, removed_vertices] =
-            self.vertices.take(|vertex| mesh.vertex(vertex).is_some());
-        let [faces, removed_faces] = self.faces.take(|face| mesh.face(face).is_some());
+        let is_new = (self.version, self.parts) == (0, 0);
+        let [vertices, faces] = mesh.slots().map(|slots| is_new.then_some(slots));
+        let is_vertex = |vertex| mesh.vertex(vertex).is_some();
+        let [vertices, removed_vertices] = self.vertices.take(vertices, is_vertex);
+        let is_face = |face| mesh.face(face).is_some();
+        let [faces, removed_faces] = self.faces.take(faces, is_face);
         self.change = PendingChange {
             removed_faces: removed_faces.into_iter(),
             vertices: vertices.into_iter(),
@@ -270,6 +260,7 @@ pub(super) mod tests {
 
     use nalgebra::Point3;
 
+    use super::super::edits::Edits;
     use super::super::version::tests::scan;
     use super::*;
     use touchup_geometry::mesh::TriMesh;
@@ -331,14 +322,14 @@ pub(super) mod tests {
     }
 
     fn apply(mesh: &mut MeshVersion, cursor: &mut MeshCursor, edits: &Edits) {
-        cursor.note_vertices(&mesh.apply(edits));
-        cursor.note(edits);
+        let changed = mesh.apply(edits);
+        cursor.note(&changed, &edits.faces);
     }
 
     #[test]
     fn a_large_change_comes_in_parts_with_vertices_before_faces() {
         let mesh = fan(25);
-        let (mut cursor, mut reader) = (MeshCursor::before(&mesh), PatchReader::default());
+        let (mut cursor, mut reader) = (MeshCursor::default(), PatchReader::default());
         let mut parts = Vec::new();
         while let Some(patch) = cursor.next_part(&mesh, 1, 10) {
             reader.take(&patch);
@@ -359,7 +350,7 @@ pub(super) mod tests {
     #[test]
     fn a_mesh_that_changes_between_the_parts_comes_in_further_parts() {
         let mut mesh = fan(25);
-        let (mut cursor, mut reader) = (MeshCursor::before(&mesh), PatchReader::default());
+        let (mut cursor, mut reader) = (MeshCursor::default(), PatchReader::default());
         reader.take(&cursor.next_part(&mesh, 1, 10).unwrap());
         // of those that have come and of those to come, one vertex moves and another goes
         for (version, vertex) in [(2, 3), (3, 20)] {
@@ -388,13 +379,13 @@ pub(super) mod tests {
     fn a_late_or_slow_follower_gets_the_newest_state_once() {
         let mut mesh = fan(3);
         let (mut early, mut late) = (PatchReader::default(), PatchReader::default());
-        let mut cursor = MeshCursor::before(&mesh);
+        let mut cursor = MeshCursor::default();
         early.take(&cursor.next_part(&mesh, 1, 10).unwrap());
         for version in 2..100 {
             let edits = moved(version, 1, version as f64);
             apply(&mut mesh, &mut cursor, &edits);
         }
-        let mut joined = MeshCursor::before(&mesh);
+        let mut joined = MeshCursor::default();
         early.take(&cursor.next_part(&mesh, 99, 10).unwrap());
         late.take(&joined.next_part(&mesh, 99, 10).unwrap());
         assert_eq!(early, late);

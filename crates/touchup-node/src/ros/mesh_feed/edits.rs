@@ -14,6 +14,8 @@ const AT_ONCE: usize = 1000;
 pub const FACES_OF_A_TILE: u32 = 500;
 /// Position of a vertex, m, in O, and its support.
 pub type VertexPlace = (Point3<f64>, Support);
+/// Number of a face and its corners; `None`: removed.
+pub type FaceEdit = (u32, Option<[u32; 3]>);
 
 /// Certainty of the touched vertices of one version.
 #[derive(Clone, Debug, Default)]
@@ -35,8 +37,8 @@ pub struct Edits {
     pub stamp_ns: i64,
     /// position and support; `None`: removed
     pub vertices: Vec<(u32, Option<VertexPlace>)>,
-    /// corners; `None`: removed
-    pub faces: Vec<(u32, Option<[u32; 3]>)>,
+    /// changed faces
+    pub faces: Vec<FaceEdit>,
     /// tiles to redraw
     pub tiles: Vec<u32>,
     taken: Changes,

@@ -106,10 +106,9 @@ impl MeshFeed {
     /// Applies changes.
     pub fn apply(&self, edits: &Edits) {
         let mut state = locked(&self.state);
-        let turned = Arc::make_mut(&mut state.mesh).apply(edits);
+        let changed = Arc::make_mut(&mut state.mesh).apply(edits);
         for cursor in state.cursors.values_mut() {
-            cursor.note_vertices(&turned);
-            cursor.note(edits);
+            cursor.note(&changed, &edits.faces);
         }
         state.is_complete = edits.is_complete;
         self.answer(&mut state);
@@ -120,7 +119,7 @@ impl MeshFeed {
         let mut state = locked(&self.state);
         let changed = Arc::make_mut(&mut state.mesh).apply_certainty(version, certainty);
         for cursor in state.cursors.values_mut() {
-            cursor.note_vertices(&changed);
+            cursor.note(&changed, &[]);
         }
         self.answer(&mut state);
     }
@@ -130,7 +129,7 @@ impl MeshFeed {
         let mesh = self.now().0.of_session(name);
         let mut state = locked(&self.state);
         for cursor in state.cursors.values_mut() {
-            *cursor = MeshCursor::before(&mesh);
+            *cursor = MeshCursor::default();
         }
         state.mesh = Arc::new(mesh);
         (state.session, state.is_complete) = (state.session + 1, true);
@@ -186,7 +185,7 @@ impl MeshFeed {
 
     /// A new follower without any data.
     pub fn follow(self: &Arc<Self>) -> MeshFollower {
-        self.follow_by(MeshCursor::before)
+        self.follow_by(|_| MeshCursor::default())
     }
 
     /// A new follower that has the current state.
@@ -261,7 +260,7 @@ impl MeshFollower {
             .cursors
             .get(&self.number)
             .map_or(mesh.version, MeshCursor::version);
-        let mut cursor = MeshCursor::before(&mesh);
+        let mut cursor = MeshCursor::default();
         std::iter::from_fn(move || cursor.next_part(&mesh, version, most))
     }
 }

@@ -121,7 +121,8 @@ impl MeshVersion {
         )
     }
 
-    /// Applies changes; returns vertices that faces use from now on, or no longer.
+    /// Applies changes; returns the changed vertices, with those that faces use from now on, or no
+    /// longer.
     pub fn apply(&mut self, edits: &Edits) -> Vec<u32> {
         for &(vertex, place) in &edits.vertices {
             let state = self.vertex_mut(vertex);
@@ -131,25 +132,20 @@ impl MeshVersion {
                 state.position = position;
             }
         }
-        let mut turned = Vec::new();
+        let mut changed = Vec::new();
         for &(face, corners) in &edits.faces {
             let was = std::mem::replace(self.face_mut(face), corners);
             self.counts[1] =
                 self.counts[1] + u32::from(corners.is_some()) - u32::from(was.is_some());
-            for vertex in corners.into_iter().flatten() {
+            let added = corners.into_iter().flatten().map(|corner| (corner, 1));
+            let removed = was.into_iter().flatten().map(|corner| (corner, -1));
+            for (vertex, step) in added.chain(removed) {
                 let uses = &mut self.vertex_mut(vertex).uses;
-                *uses += 1;
-                if *uses == 1 {
-                    self.counts[0] += 1;
-                    turned.push(vertex);
-                }
-            }
-            for vertex in was.into_iter().flatten() {
-                let uses = &mut self.vertex_mut(vertex).uses;
-                *uses -= 1;
-                if *uses == 0 {
-                    self.counts[0] -= 1;
-                    turned.push(vertex);
+                *uses = uses.wrapping_add_signed(step);
+                // the first face, or the last
+                if *uses == u32::from(step > 0) {
+                    self.counts[0] = self.counts[0].wrapping_add_signed(step);
+                    changed.push(vertex);
                 }
             }
         }
@@ -157,7 +153,8 @@ impl MeshVersion {
             (self.version, self.shape_version, self.stamp_ns) =
                 (edits.version, edits.version, edits.stamp_ns);
         }
-        turned
+        changed.extend(edits.vertices.iter().map(|(vertex, _)| *vertex));
+        changed
     }
 
     /// Applies the certainty of vertices; returns the changed vertices.
