@@ -42,7 +42,7 @@ fn truth(faces: usize) -> (TriMesh, FaceTree) {
     (mesh, tree)
 }
 
-/// Signed distance of a million points from a surface of so many faces, as `touchup compare`
+/// Signed distance of a million points from a surface of `faces` faces, as `touchup compare`
 /// measures it.
 #[divan::bench(args = [100_000, 1_000_000, 2_000_000], sample_count = 5)]
 fn point_to_surface(bencher: Bencher, faces: usize) {
@@ -65,7 +65,7 @@ fn distances(bencher: Bencher, faces: usize, workers: &dyn Workers) {
         .bench(|| deviations(&points, &mesh, &tree, workers));
 }
 
-/// A hundred thousand points, 1 mm and 0.6° off, onto a surface of so many faces.
+/// A hundred thousand points, 1 mm and 0.6° off, onto a surface of `faces` faces.
 #[divan::bench(args = [200_000, 2_000_000], sample_count = 10)]
 fn points_to_mesh(bencher: Bencher, faces: usize) {
     register(bencher, faces, &Threads);

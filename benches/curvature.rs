@@ -52,7 +52,7 @@ fn in_order(bencher: Bencher, cells: u32) {
     bencher.bench_local(|| curvature(black_box(&mesh)));
 }
 
-/// The method of the paper on every vertex of the mesh, as its peers were measured.
+/// The method of the paper on every vertex of the mesh, as the peers run it.
 #[divan::bench(args = CELLS, sample_count = 5)]
 fn five_means(bencher: Bencher, cells: u32) {
     let mesh = waves(cells);

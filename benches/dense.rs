@@ -3,11 +3,11 @@
 //!
 //! A ball slides over a wavy plate in a raster at 1 kHz, with contacts a little below the scan. One
 //! line for each density and size: time to begin, time from a sample to its answer and until the
-//! next one is awaited, how many vertices a sample may move, memory of the process. As a recording
-//! is replayed, as fast as samples can be read, with the patch made at the end; with `live` in real
-//! time, the patch on a thread of its own: how old the touches are that it shows, and how many of
-//! its renewals were late. A sample that is due before the one before is followed waits: that
-//! counts as its time.
+//! engine awaits the next one, the largest number of vertices that a sample moves, memory of the
+//! process. By default the bench replays a recording as fast as it reads samples, with the patch
+//! made at the end; with `live` it runs in real time with the patch on a thread of its own, and
+//! prints the age of the touches in the patch and the number of late renewals. A due sample waits
+//! until the engine has followed the sample before; the wait counts as its time.
 //!
 //! `cargo bench --bench dense [-- live] [SECONDS [FACES…]]`
 
@@ -73,7 +73,7 @@ fn measure(faces: usize, edge: f64, seconds: usize, is_live: bool) {
         if is_live {
             let (due, now) = (Duration::from_millis(i as u64), begun.elapsed());
             waited = now.saturating_sub(due);
-            // a thread that waits busily would slow the other down where both share a core
+            // a busy wait slows the other thread down on a shared core
             std::thread::sleep(due.saturating_sub(now));
         }
         let start = Instant::now();

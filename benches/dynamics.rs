@@ -1,6 +1,6 @@
-//! One held sample: what does each step rule cost, and each contact model?
+//! Cost of one held sample for each step rule and each contact model.
 //!
-//! `usual`: 1 kHz, h_min 0.5 mm, tips within 2 mm of the face, 0.5–5 N, tilted up to 20°. `stiff`:
+//! `usual`: 1 kHz, h_min 0.5 mm, tips within 2 mm of the face, 0.5–5 N, tilts up to 20°. `stiff`:
 //! h_min 1e-3 mm, 5 ms.
 
 use divan::{Bencher, black_box};

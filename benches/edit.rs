@@ -1,11 +1,11 @@
 //! Cost of replacing faces: 300 by 600 in a spot of 5 mm, and back, in mesh and tree, again and
 //! again.
 //!
-//! Each round takes the 300 faces nearest to the middle of the spot out, one after another, and
-//! splits each of them in two at the middle of its longest edge; the next round undoes it. After
-//! that the spot moves on. Queries are timed on the tree that was edited and on a rebuilt one.
-//! Figures are per face, from an own sorted list. All of it is done three times over, and the least
-//! of three counts for each edit: other load of the machine is not an edit's cost.
+//! Each round takes the 300 faces nearest to the middle of the spot, one after another, and splits
+//! each in two at the middle of its longest edge; the next round undoes it. After that the spot
+//! moves on. Queries run on the edited tree and on a rebuilt one. Figures are per face, from an own
+//! sorted list. Each edit runs three times and its least time counts, free of other load of the
+//! machine.
 //!
 //! `cargo bench --bench edit [-- FACES…]`
 

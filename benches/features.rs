@@ -1,5 +1,5 @@
-//! How long does it take to find the features of a scan of 1M vertices, and to take new touches
-//! into those that are known?
+//! Time to find the features of a scan of 1M vertices, and to update known features with new
+//! touches.
 
 #[path = "../tests/common/plate_stream.rs"]
 mod plate_stream;
@@ -19,7 +19,7 @@ fn main() {
     divan::main();
 }
 
-/// How often each face is divided into four: 72,000 and 1,150,000 vertices.
+/// Divisions of each face into four: 72,000 and 1,150,000 vertices.
 const DIVISIONS: [u32; 2] = [1, 3];
 
 /// The demo's plate by a scanner that is good: 5 µm of noise, edges rounded by 20 µm.

@@ -2,12 +2,12 @@
 //! the patch has a thread of its own.
 //!
 //! A ball slides over a wavy plate in a raster, with contacts a little below the scan. One line for
-//! each minute: times of [`Engine::answer`], with the wait for what followed the sample before, how
-//! old the touches are that the patch shows (in time of the samples), how many renewals of it were
-//! late, faces, and memory of the process.
+//! each minute: times of [`Engine::answer`], including the wait for the follow-up of the sample
+//! before, the age of the touches in the patch (in time of the samples), its late renewals, faces,
+//! and memory of the process.
 //!
-//! `cargo bench --bench live [-- FACES [SECONDS [fast]]]`; `fast` does not wait for real time, so
-//! that each push waits for the patch and pushes are not timed.
+//! `cargo bench --bench live [-- FACES [SECONDS [fast]]]`; `fast` does not wait for real time: each
+//! push waits for the patch, and the bench does not time pushes.
 
 mod memory;
 mod sliding;
@@ -45,7 +45,7 @@ fn main() {
         radius: RADIUS,
         stiffness: Some(STIFFNESS),
     };
-    // its uncertainty is asked for, too
+    // with the uncertainty of the patch
     let params = PatcherParams::new(RADIUS, Some(STIFFNESS), SCAN_NOISE);
     let scan = Arc::new((mesh.clone(), FaceTree::new(&mesh)));
     let pace = Pace {
@@ -70,7 +70,7 @@ fn main() {
     for i in 0..seconds * 1000 {
         let sample = noisy_slide_on(SIDE, i, WIDTH);
         let due = Duration::from_millis(if is_fast { 0 } else { i as u64 });
-        // a thread that waits busily would slow the other down where both share a core
+        // a busy wait slows the other thread down on a shared core
         let now = begun.elapsed();
         std::thread::sleep(due.saturating_sub(now));
         let waited = if is_fast {

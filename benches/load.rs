@@ -12,9 +12,9 @@ use touchup::io::mesh_file::{MeshUnit, read_mesh, write_mesh};
 use touchup::mesh::{FaceTree, TriMesh, repair};
 use touchup::threads::Threads;
 
-/// Quads of 1 mm in a row, and rows, of a wavy sheet: a million triangles …
+/// Quads of 1 mm in a row, and rows, of a wavy sheet of a million triangles.
 const MILLION: [u32; 2] = [1000, 500];
-/// … and five.
+/// The same for five million triangles.
 const FIVE_MILLION: [u32; 2] = [2000, 1250];
 
 fn main() {
@@ -112,7 +112,7 @@ fn repair_only(bencher: divan::Bencher) {
         .bench_local_values(|(positions, faces)| repair(positions, faces).expect("sound"));
 }
 
-/// What `tobj` takes of `text.obj`, for comparison.
+/// `tobj` on `text.obj`, for comparison.
 #[divan::bench(sample_count = 5)]
 fn tobj_only(bencher: divan::Bencher) {
     let (_folder, path) = file("text.obj", MILLION);

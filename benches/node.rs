@@ -1,14 +1,15 @@
-//! Cost of a sample in the node: from the arrival of what completes it to the mesh, with view,
-//! features and recording beside it. A ball slides over a wavy plate in real time, wrench and pose
-//! each at 1 kHz.
+//! Cost of a sample in the node: from the arrival of the message that completes it to the mesh,
+//! with view, features and recording beside it. A ball slides over a wavy plate in real time,
+//! wrench and pose each at 1 kHz.
 //!
-//! - `cargo bench --bench node [-- FACES…]`: alone, what arrives is put in by hand.
+//! - `cargo bench --bench node [-- FACES…]`: alone; the bench puts arrivals into the inbox.
 //! - `cargo bench --bench node --features web -- pages [FACES [TURNS]]`: the same beside pages:
 //!   none, one that reads, and one that never reads, by turns; at the end the middle p99 of each
 //!   against that without a page.
 //! - `cargo bench --bench node -- dds [FACES [SECONDS [FOLDER]]]`: sensors and viewer are a process
 //!   each, over DDS on the loopback interface; before and after it a bare echo over the same. 600 s
-//!   is the soak; memory is printed each minute. Into `FOLDER` go plots and a table of each second.
+//!   is the soak, which prints memory each minute. Into `FOLDER` go plots and a table of each
+//!   second.
 
 #[path = "node/course.rs"]
 mod course;
@@ -50,7 +51,7 @@ use touchup::stylus::{Message, Sample, StampedPose, StampedWrench};
 /// Width of the raster, m: 2.3 minutes each time, so that a soak comes to the same places again and
 /// again.
 const WIDTH: f64 = 20e-3;
-/// So long it slides in process.
+/// Duration of the sliding in process.
 const SECONDS: usize = 20;
 /// Duration of the echo measurement.
 const ECHO_SECONDS: usize = 10;
@@ -167,7 +168,7 @@ fn alone(faces: usize) {
     print_summary(&slid_over(node, &world));
 }
 
-/// A node is touched for [`SECONDS`] in real time; its report.
+/// Touches a node for [`SECONDS`] in real time; returns its report.
 fn slid_over(node: Node, world: &OtherParticipants) -> SessionReport {
     let mut published = 0;
     let begun = Instant::now();
@@ -187,7 +188,7 @@ fn slid_over(node: Node, world: &OtherParticipants) -> SessionReport {
         ] {
             let frame = frame.to_owned();
             let arrival = Arrival::Message(LiveMessage { frame, message }, Instant::now());
-            // what finds no room is in the report
+            // the report counts samples that find no room
             let _ = world.arrive(arrival);
         }
         if i % 20 == 0 {
@@ -202,7 +203,7 @@ fn slid_over(node: Node, world: &OtherParticipants) -> SessionReport {
     node.join().expect("the result can be written").report
 }
 
-/// The same beside pages, by turns, so that what else the machine does falls on all of them.
+/// The same beside pages, by turns, so that other load of the machine falls on all of them.
 #[cfg(feature = "web")]
 #[expect(clippy::too_many_lines)]
 fn beside_pages(faces: usize, turns: usize) {
@@ -279,7 +280,7 @@ fn beside_pages(faces: usize, turns: usize) {
 
 /// This program again, as another end.
 ///
-/// - `out`: where it writes what it sees.
+/// - `out`: file of its observations.
 fn other(role: &str, domain: u16, seconds: usize, out: &Path) -> Command {
     let mut program = Command::new(std::env::current_exe().expect("a program knows where it is"));
     program
@@ -299,13 +300,13 @@ fn check(mut child: Child) {
     );
 }
 
-/// What another end wrote.
+/// Observations that another end wrote.
 fn written<T: DeserializeOwned>(path: &Path) -> T {
     let text = std::fs::read(path).expect("the other process wrote it");
     serde_json::from_slice(&text).expect("it is as it is read")
 }
 
-/// A viewer: it runs until it is dropped here.
+/// A viewer process; dropping it here ends it.
 struct Viewer {
     child: Child,
     said: BufReader<ChildStdout>,

@@ -48,7 +48,7 @@ impl Case {
             .flat_map(|x| (lo[1]..hi[1]).flat_map(move |y| (lo[2]..hi[2]).map(move |z| [x, y, z])));
         for cell in cells {
             let centre = lattice.position(cell) + Vector3::repeat(PITCH / 2.0);
-            // a shell of two cells, as the field is known near the surface only
+            // a shell of two cells, since the field is known near the surface only
             if tree.closest(&scan, &centre, 1.5 * PITCH).is_none() {
                 continue;
             }

@@ -2,8 +2,8 @@
 //! loop beside it.
 //!
 //! A ball slides over a wavy plate at 50 mm/s and 1 kHz with contacts a little below the scan, so
-//! that every timed push is in contact and moves vertices. Afterwards 1,000 queries are compared
-//! with brute force. Figures are per push, from an own sorted list: a mean would hide the tails.
+//! that every timed push is in contact and moves vertices. Afterwards 1,000 queries equal brute
+//! force. Figures are per push, from an own sorted list: a mean would hide the tails.
 //!
 //! `cargo bench --bench push [-- FACES…]`
 

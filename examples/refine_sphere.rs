@@ -18,7 +18,7 @@ const BALL: TipParams = TipParams {
     radius: 1.5e-3,
     stiffness: Some(20e3),
 };
-/// How hard the ball is pressed, N.
+/// Pressing force of the ball, N.
 const FORCE: f64 = 2.5;
 
 fn main() -> anyhow::Result<()> {

@@ -1,4 +1,4 @@
-//! A scan and a ROS 2 recording in, a refined mesh out: what `touchup refine` does, by the library.
+//! A scan and a ROS 2 recording in, a refined mesh out: `touchup refine` by the library.
 //!
 //! cargo run --release -- demo
 //! cargo run --release --example replay_recording out/scan.ply out/touch.mcap refined.ply

@@ -57,7 +57,7 @@ fn tile(id: i32) -> Marker {
     }
 }
 
-/// Features that are found, more than an answer can name.
+/// Number of features, more than an answer can name.
 const FEATURES: u32 = 300;
 /// As many as an answer of the node names at most.
 const MOST_NAMED: u32 = 128;
@@ -102,7 +102,7 @@ fn main() -> anyhow::Result<()> {
     let (inbox, arrivals) = inbox(4096, &Clock::system());
     let port = dds::start(&config, inbox.clone())?;
     thread::spawn(move || {
-        // ends as well when the other end is dropped
+        // ends as well when the other end drops the pipe
         let _ = std::io::copy(&mut stdin(), &mut std::io::sink());
         inbox.put(Arrival::Shutdown);
     });
@@ -131,8 +131,7 @@ fn main() -> anyhow::Result<()> {
                 }));
             }
             Arrival::Call(Call::Undo(request, reply)) => {
-                // as long as it is asked for: in the enhanced mapping it is cut where it fits into
-                // no packet
+                // as long as the request says: the enhanced mapping cuts it into packets
                 let message = "echo".repeat(request.strokes as usize);
                 let answer = UndoResponse {
                     success: true,

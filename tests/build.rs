@@ -1,4 +1,4 @@
-//! Tells the loader where the Python is that the program was built for.
+//! Tells the loader the folder of the Python that the program links to.
 
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");

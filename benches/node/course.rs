@@ -9,7 +9,7 @@ use touchup::live::{Latencies, Quantiles};
 use touchup_report::document::Report;
 use touchup_report::{Axis, Chapter, Drawing, Figure, LineStroke, Mark, Series, Table};
 
-/// A touch is to be shown after this, ms.
+/// Largest wanted delay from a touch to its display, ms.
 const WANTED_MS: f64 = 50.0;
 
 /// Median, 99 % and the longest of some times, ms.
@@ -34,7 +34,7 @@ impl Times {
     }
 }
 
-/// What the sensors saw.
+/// Answer times at the sensors.
 #[derive(Debug, Serialize, Deserialize)]
 pub struct Answers {
     /// time of the first sample, ns since 1970, a whole second
@@ -44,24 +44,24 @@ pub struct Answers {
     pub seconds: Vec<(u64, Option<Times>)>,
 }
 
-/// What the viewer saw.
+/// Displayed changes at the viewer.
 #[derive(Debug, Serialize, Deserialize)]
 pub struct Drawn {
     /// by the second, since 1970
     pub seconds: BTreeMap<i64, SecondDrawn>,
 }
 
-/// What the viewer saw of one second.
+/// Displayed changes of one second.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct SecondDrawn {
-    /// from a sample that moves a vertex to where the viewer has it
+    /// from a sample that moves a vertex to the vertex at the viewer
     pub drawn: Option<Times>,
-    /// age of the touches that the patch in the mesh shows, as the node says; renewals of the patch
-    /// so far, and those that were late
+    /// age of the touches in the patch of the mesh, from the node's diagnostics; its renewals and
+    /// late renewals up to now
     pub shown: Option<(Times, [u64; 2])>,
 }
 
-/// All that was seen of one second.
+/// All observations of one second.
 #[derive(Clone, Copy, Debug)]
 struct Second {
     unanswered: u64,
@@ -179,7 +179,7 @@ fn usage(seconds: &[Second]) -> Figure {
         "Memory of the node; {unanswered} of {} samples not answered, {late} of {renewals} renewals late",
         1000 * seconds.len()
     );
-    // from 0, so that what is flat looks flat
+    // from 0, so that a flat series looks flat
     let floor = Series::new(
         "0",
         LineStroke::Dashed,

@@ -24,7 +24,7 @@ fn opened(address: SocketAddr) -> TcpStream {
     stream
 }
 
-/// A page that reads all that it is sent, until the server ends.
+/// A page that reads everything until the server ends.
 pub fn reading(address: SocketAddr) {
     let mut stream = opened(address);
     spawn(move || {
@@ -33,7 +33,7 @@ pub fn reading(address: SocketAddr) {
     });
 }
 
-/// A page that takes nothing for as long as this is kept.
+/// A page that never reads; it lives as long as the returned stream.
 pub fn stuck(address: SocketAddr) -> TcpStream {
     opened(address)
 }

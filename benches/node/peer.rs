@@ -1,5 +1,5 @@
-//! The other processes of the bench over DDS: one sends what sensors send and takes the answers,
-//! one sees what a viewer sees.
+//! The other processes of the bench over DDS: one plays the sensors and takes the answers, one
+//! plays the viewer.
 
 use std::collections::{BTreeMap, HashMap};
 use std::io::{Read, stdin};
@@ -29,7 +29,7 @@ use crate::{WIDTH, messages, shown};
 
 /// ns
 const SECOND_NS: i64 = 1_000_000_000;
-/// All tiles are there when none has come for so long.
+/// Silence after the last tile that marks the tiles as complete.
 const QUIET: Duration = Duration::from_secs(1);
 /// Time limit for discovery of the other end.
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -114,7 +114,7 @@ fn wait_for_matches(context: &Context, wanted: usize) {
     sleep(QUIET);
 }
 
-/// Where a vertex is, as a change of the mesh names it: x y z in single precision, as bits.
+/// Place of a vertex in a mesh change: x y z in single precision, as bits.
 type VertexBits = [u32; 3];
 
 fn place(point: &Point) -> VertexBits {
@@ -124,7 +124,7 @@ fn place(point: &Point) -> VertexBits {
 /// The mesh as a viewer has it.
 #[derive(Default)]
 struct Tiles {
-    /// corners of what is drawn
+    /// corners of the displayed triangles, by tile
     seen: BTreeMap<i32, Vec<VertexBits>>,
     changed: Option<Instant>,
     received: u64,
@@ -172,7 +172,7 @@ pub fn join_late(domain: u16) {
     );
 }
 
-/// What the viewer sees.
+/// State of the viewer.
 #[derive(Default)]
 struct Viewer {
     /// when a vertex was first drawn here, ns since 1970
@@ -185,19 +185,18 @@ struct Viewer {
     visible: Latencies,
     /// the same by the second of the stamp
     seconds: BTreeMap<i64, Latencies>,
-    /// what the node says of each second: age of what the patch shows, renewals, and those that
-    /// were late
+    /// diagnostics of the node by the second: age of the patch, renewals, and late renewals
     shown: BTreeMap<i64, (Times, [u64; 2])>,
 }
 
 impl Viewer {
-    /// Vertices were moved; an earlier tile may show the new position.
+    /// Notes moved vertices; an earlier tile may show the new position.
     fn note(&mut self, patch: &MeshPatch) {
         let moved_ns = stamp_ns(patch.header.stamp);
         for (&vertex, position) in patch.vertices.iter().zip(patch.positions.chunks_exact(3)) {
             let place = [0, 1, 2].map(|axis| position[axis].to_bits());
             match self.drawn.get(&place) {
-                // it went back to where it was before: the drawing does not show when
+                // it returned to its earlier place: the display does not show when
                 Some(&at_ns) if at_ns < moved_ns => self.forget(vertex),
                 Some(&at_ns) => self.record(moved_ns, at_ns),
                 None => {
@@ -253,7 +252,7 @@ impl Viewer {
             .record(took);
     }
 
-    /// What the node says of the second that ends.
+    /// Notes the node's diagnostics of the second that ends.
     fn note_diagnostics(&mut self, message: &DiagnosticArray) {
         let values = message.status.iter().flat_map(|status| &status.values);
         let values: HashMap<&str, f64> = values
@@ -273,13 +272,13 @@ impl Viewer {
                 [number("renewals")? as u64, number("late_renewals")? as u64],
             ))
         };
-        // before anything was touched nothing is shown
+        // before the first touch the patch is empty
         if let Some(shown) = shown().filter(|(times, _)| times.longest > 0.0) {
             self.shown.insert(wall_ns() / SECOND_NS, shown);
         }
     }
 
-    /// What was seen, by the second.
+    /// Observations by the second.
     fn seen(&self) -> Drawn {
         let at = |second: &i64| SecondDrawn {
             drawn: self.seconds.get(second).and_then(Times::of),
@@ -358,8 +357,8 @@ pub fn view(domain: u16) -> Drawn {
     seen.seen()
 }
 
-/// Sends wrenches at 1 kHz, and poses where the other end is the node, from a whole second on;
-/// measures how long answers take.
+/// Sends wrenches at 1 kHz, and poses if the other end is the node, from a whole second on;
+/// measures the delay of answers.
 #[expect(clippy::too_many_lines)]
 pub fn touch(domain: u16, seconds: usize, is_node: bool) -> Answers {
     let (context, mut node) = joined(domain, "sensors");

@@ -1,4 +1,4 @@
-//! What the benches of a sliding ball share.
+//! Course and settings that the benches of a sliding ball share.
 
 /// Assumed scan noise, m.
 pub const SCAN_NOISE: f64 = 0.3e-3;

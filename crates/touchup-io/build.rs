@@ -1,9 +1,9 @@
-//! The commit that the program is built from, which only the build knows.
+//! Passes the commit of the sources to the program.
 
 use std::path::Path;
 use std::process::Command;
 
-/// What is built, from the root of the checkout.
+/// Sources of the program, relative to the root of the checkout.
 const SOURCES: [&str; 4] = ["src", "crates", "Cargo.toml", "Cargo.lock"];
 
 fn main() {
@@ -14,14 +14,14 @@ fn main() {
     );
 }
 
-/// `None` without git, and where this is no checkout of its own: a tarball, or inside another
-/// repository.
+/// `None` without git, and for a tree that is no checkout of its own: a tarball, or a folder inside
+/// another repository.
 fn commit() -> Option<String> {
     git(&["ls-files", "--error-unmatch", "build.rs"])?;
-    // asked again when HEAD moves, and when a source changes, which is built again anyway
+    // cargo reruns this when HEAD moves; a changed source reruns it anyway
     let branch = git(&["symbolic-ref", "--quiet", "HEAD"]);
     for name in ["HEAD", "logs/HEAD", branch.as_deref().unwrap_or("HEAD")] {
-        // a path that is not there would be asked for at every build
+        // cargo would rerun this at every build for a missing path
         git(&["rev-parse", "--git-path", name])
             .filter(|path| Path::new(path).exists())
             .into_iter()
@@ -46,7 +46,7 @@ fn watch(path: String) {
     println!("cargo::rerun-if-changed={path}");
 }
 
-/// What it prints; `None` where it fails.
+/// Output of git; `None` if it fails.
 fn git(arguments: &[&str]) -> Option<String> {
     let output = Command::new("git").args(arguments).output().ok()?;
     let text = String::from_utf8(output.stdout).ok()?;

@@ -1,6 +1,6 @@
-//! What is made before the program is compiled: the messages of ROS, from the files that define
-//! them; and with feature `ur` the place of the Python that the program was built for, so that the
-//! loader finds it also where there are two; with feature `web` the operator's page.
+//! Generates sources before compilation: the messages of ROS from their definitions, and with
+//! feature `web` the operator page. With feature `ur` it passes on the folder of the Python that
+//! the program links to, so that the loader finds it beside another Python.
 
 #[path = "generate/definition.rs"]
 mod definition;
@@ -66,7 +66,7 @@ fn read(
     Ok(())
 }
 
-/// What is in a folder, by name.
+/// Entries of a folder, by name.
 fn entries(folder: &str) -> std::io::Result<Vec<String>> {
     println!("cargo::rerun-if-changed={folder}");
     let paths = fs::read_dir(folder)?

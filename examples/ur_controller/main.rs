@@ -2,22 +2,20 @@
 //! an arm that touches a part.
 //!
 //! cargo run --features ur --example ur_controller -- ADDRESS [--record FILE] [--version 5.15.0]
-//! [--start-mm X,Y,Z]
-//!     [--payload KG,X,Y,Z]
+//!     [--start-mm X,Y,Z] [--payload KG,X,Y,Z]
 //!
-//! It does what ur_rtde 1.6.5 and its program see of a controller; how a real one stops, presses
-//! and watches is modelled, not copied. Lines on stdin make faults: drop, undash, mute, silent,
-//! deaf, stuck, hung, slow PERIODS, tired, late states MS, late orders MS, rate HZ, slider PERCENT, reduced,
-//! full, watchdog counts, pause, resume, open, shut, unplug, die, protective, operator, release,
-//! halt, off, local, spike N, drift N_PER_S, noise N, payload KG, raise MM, mend, mark TEXT. It
-//! ends when stdin does.
+//! It covers the part of a controller that ur_rtde 1.6.5 and its program see; a model stands in for
+//! the stopping, pressing and watching of a real one. Lines on stdin make faults: drop, undash,
+//! mute, silent, deaf, stuck, hung, slow PERIODS, tired, late states MS, late orders MS, rate HZ,
+//! slider PERCENT, reduced, full, watchdog counts, pause, resume, open, shut, unplug, die,
+//! protective, operator, release, halt, off, local, spike N, drift N_PER_S, noise N, payload KG,
+//! raise MM, mend, mark TEXT. It ends with stdin.
 //!
 //! It has a clock of its own, in lock step with its client: while a program of the client plays, a
-//! period passes when the client has sent its next order, so a machine that is late changes
-//! nothing. No period is shorter than on a robot; without a program the clock is that of the
-//! machine. A line `run MS` lets so much time pass whatever the client says. States, motion,
-//! safety, watchdog and record go by this clock. Each line is repeated on stdout when it has been
-//! done.
+//! period passes when the client has sent its next order, so a slow machine changes nothing. No
+//! period is shorter than on a robot; without a program the clock is that of the machine. A line
+//! `run MS` lets MS milliseconds pass regardless of the client. States, motion, safety, watchdog
+//! and record go by this clock. Stdout repeats each line after its execution.
 
 mod dashboard;
 mod model;
@@ -49,7 +47,7 @@ const LOOK: Duration = Duration::from_micros(500);
 /// The holes of the part are polygons within this of their circles, m.
 const CHORD: f64 = 2e-6;
 
-/// What hangs on the flange: the payload that the client states for a probe by default.
+/// Payload on the flange: the one that the client states for a probe by default.
 const PROBE: Payload = Payload {
     mass: 0.25,
     p_sc: Vector3::new(0.0, 0.0, 0.05),
@@ -250,7 +248,7 @@ impl Served<'_> {
         }
     }
 
-    /// What a line on stdin asks for.
+    /// Executes a line of stdin.
     fn happen(&mut self, line: &str) {
         happen(&mut self.controller, line);
         match line {

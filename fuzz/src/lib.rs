@@ -1,5 +1,5 @@
-//! Targets that take any bytes, the seeds that they begin from, and what they share: bytes as a
-//! file, numbers of any size, small parts, invariants of a mesh.
+//! Targets that take any bytes, their seeds, and shared parts: bytes as a file, numbers of any
+//! size, small parts, invariants of a mesh.
 //!
 //! The tests run each target on its seeds; `fuzz/run` lets libFuzzer change them, guided by
 //! coverage.
@@ -24,7 +24,7 @@ pub const BALL: TipParams = TipParams {
     stiffness: Some(20e3),
 };
 
-/// Where floats end, and where their squares and products do.
+/// Ends of the range of floats, of their squares and of their products.
 const ENDS: [f64; 14] = [
     0.0,
     5e-324,
@@ -50,17 +50,17 @@ pub fn place(name: &str) -> PathBuf {
 /// A file of that name with these bytes.
 ///
 /// # Panics
-/// Where it cannot be written.
+/// If it cannot write the file.
 pub fn file(name: &str, bytes: &[u8]) -> PathBuf {
     let path = place(name);
     fs::write(&path, bytes).expect("the folder for temporary files takes a file");
     path
 }
 
-/// A number of the usual size, now and then any that a float can be.
+/// A number of the usual size, now and then any float.
 ///
 /// # Errors
-/// Where the bytes end.
+/// At the end of the bytes.
 pub fn number(bytes: &mut Unstructured, usual: f64) -> Result<f64> {
     Ok(match bytes.arbitrary::<u8>()? {
         tag @ 0..=27 => ENDS[usize::from(tag) % ENDS.len()] * if tag < 14 { 1.0 } else { -1.0 },
@@ -73,7 +73,7 @@ pub fn number(bytes: &mut Unstructured, usual: f64) -> Result<f64> {
 /// Three of them.
 ///
 /// # Errors
-/// Where the bytes end.
+/// At the end of the bytes.
 pub fn vector(bytes: &mut Unstructured, usual: f64) -> Result<Vector3<f64>> {
     Ok(Vector3::new(
         number(bytes, usual)?,
@@ -85,7 +85,7 @@ pub fn vector(bytes: &mut Unstructured, usual: f64) -> Result<Vector3<f64>> {
 /// An orientation: mostly none, else four numbers, which need not have length 1.
 ///
 /// # Errors
-/// Where the bytes end.
+/// At the end of the bytes.
 pub fn rotation(bytes: &mut Unstructured) -> Result<UnitQuaternion<f64>> {
     Ok(match bytes.arbitrary::<u8>()? {
         0..=199 => UnitQuaternion::identity(),
@@ -97,11 +97,10 @@ pub fn rotation(bytes: &mut Unstructured) -> Result<UnitQuaternion<f64>> {
     })
 }
 
-/// The sample after `stamp_ns`: near `near`, within about `usual` m, without force or pressed by
-/// any.
+/// The sample after `stamp_ns`: near `near`, within about `usual` m, without force or with any.
 ///
 /// # Errors
-/// Where the bytes end.
+/// At the end of the bytes.
 pub fn sample(
     bytes: &mut Unstructured,
     stamp_ns: &mut i64,
@@ -172,7 +171,7 @@ pub fn open_edges(mesh: &TriMesh) -> usize {
 }
 
 /// # Panics
-/// Where a vertex of the mesh has no place.
+/// If a vertex of the mesh is not finite.
 pub fn assert_is_somewhere(mesh: &TriMesh) {
     let nowhere = mesh.positions().iter().position(|p| !is_place(p));
     assert_eq!(
@@ -183,7 +182,7 @@ pub fn assert_is_somewhere(mesh: &TriMesh) {
     );
 }
 
-/// Reads a recording to its end: what it says of itself and each message.
+/// Reads a recording to its end: its description and each message.
 pub fn read_all(path: &Path, layout: impl Into<RecordingLayout>) {
     let Ok(mut reader) = RecordingReader::open(path, layout) else {
         return;

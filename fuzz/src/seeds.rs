@@ -1,5 +1,4 @@
-//! What every run begins from: a small sound input of each kind, and recordings made around given
-//! bytes.
+//! Seeds: a small sound input of each kind, and recordings around given bytes.
 
 use std::fs;
 use std::io::Cursor;
@@ -142,10 +141,10 @@ fn text(text: &str) -> Vec<u8> {
     [&(text.len() as u32).to_le_bytes(), text.as_bytes()].concat()
 }
 
-/// A recording as the program writes it.
+/// A recording by the program's writer.
 ///
 /// # Panics
-/// Where it cannot be written into memory.
+/// If writing into memory fails.
 pub fn mcap_bytes() -> Vec<u8> {
     let topics = Topics {
         markers: Some(MARKERS.into()),

@@ -5,15 +5,15 @@ use std::f64::consts::FRAC_PI_2;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use touchup::probing::arm::{ChainJoint, ChainLink, SerialChain, UrGeometry};
 
-/// So far along z, then along x, then turned about x: what follows the joint's turn in Denavit and
-/// Hartenberg's rows.
+/// Translation by `d` along z, then by `a` along x, then turn by `alpha` about x: the transform
+/// after a joint's turn in Denavit and Hartenberg's rows.
 fn after_joint(d: f64, a: f64, alpha: f64) -> Isometry3<f64> {
     let tilt = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), alpha);
     Isometry3::from_parts(Translation3::new(a, 0.0, d), tilt)
 }
 
-/// Joints about the z of frames, of which each is given in the one before after that has turned,
-/// the last is the flange.
+/// Joints about the z axes of frames, each frame given in the one before after its turn; the last
+/// is the flange.
 fn chain_of(frames: &[Isometry3<f64>], ranges: &[[f64; 2]], radius: f64) -> SerialChain {
     let (end, origins) = frames.split_last().unwrap();
     let joint = |(number, (origin, range)): (usize, (&Isometry3<f64>, &[f64; 2]))| ChainJoint {

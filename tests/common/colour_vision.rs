@@ -16,7 +16,7 @@ const SEEN: [[[f64; 3]; 3]; 3] = [
     ],
 ];
 
-/// CIE 1976 L*a*b* of a colour (sRGB, 0 to 255, white of D65) as it is seen.
+/// CIE 1976 L*a*b* of a colour (sRGB, 0 to 255, white of D65) as the eye of `seen` perceives it.
 fn lab(colour: [u8; 3], seen: &[[f64; 3]; 3]) -> [f64; 3] {
     let linear = colour.map(|c| {
         let c = f64::from(c) / 255.0;

@@ -65,7 +65,7 @@ pub fn contacts_of(radius: f64, stiffness: Option<f64>, samples: &[Sample]) -> V
         .collect()
 }
 
-/// The plate as the scanner of the demo sees it; of each seed it is made once.
+/// The plate as the scanner of the demo sees it, computed once for each seed.
 pub fn plate_scan(seed: u64) -> TriMesh {
     static SCANS: Mutex<BTreeMap<u64, TriMesh>> = Mutex::new(BTreeMap::new());
     let scanned = || {

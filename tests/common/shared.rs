@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-/// A file or folder below `../shared/data`; `None`, with [`skip`], where it is not there.
+/// A file or folder below `../shared/data`; `None`, with [`skip`], if it is absent.
 pub fn shared(below: &str) -> Option<PathBuf> {
     let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
         .join("../shared/data")
@@ -14,8 +14,8 @@ pub fn shared(below: &str) -> Option<PathBuf> {
     None
 }
 
-/// Reports that this test was skipped: `tests/all.sh` counts the line as a skipped test, not as a
-/// passed one.
+/// Reports this test as skipped: `tests/all.sh` counts the line as a skipped test, not as a passed
+/// one.
 pub fn skip(reason: &str) {
     let thread = std::thread::current();
     println!(

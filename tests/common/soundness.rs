@@ -113,9 +113,10 @@ fn meet(mesh: &TriMesh, f: FaceId, g: FaceId, slack: f64) -> bool {
     }
 }
 
-/// Pairs of faces that meet where they should not, among pairs of which `is_watched` holds for one.
+/// Pairs of faces that intersect each other, among pairs in which `is_watched` holds for one.
 ///
-/// Boxes are swept along x; the test is exact up to volumes of 10⁻¹² of the cube of `size` (m).
+/// The search sweeps boxes along x; the test is exact up to volumes of 10⁻¹² of the cube of `size`
+/// (m).
 pub fn intersections(
     mesh: &TriMesh,
     size: f64,

@@ -1,5 +1,5 @@
-//! A scan that no touch changes, as the world of an arm: it can have the arm stop, and keeps what
-//! it saw.
+//! A scan that no touch changes, as the world of an arm: it can stop the arm, and keeps its
+//! observations.
 
 use nalgebra::Point3;
 use touchup::mesh::{FaceHit, FaceTree, TriMesh};
@@ -7,22 +7,22 @@ use touchup::probing::arm::{ArmState, Observer, StopRequest};
 use touchup::probing::execute::{ProbedTouch, Progress, RobotCell, World};
 use touchup::sim::{Plate, Surface};
 
-/// A mesh that stays unchanged; it can have the arm stop.
+/// A mesh that stays unchanged; it can stop the arm.
 pub struct StaticScan {
     pub mesh: TriMesh,
     pub tree: FaceTree,
     /// cancels after this many states
     pub patience: Option<usize>,
-    /// has it stay where it is after this many, and when that was, ns
+    /// makes the arm stay after this many states, and the time of that, ns
     pub stays_after: Option<usize>,
     pub stayed_ns: i64,
     pub seen: usize,
     pub touches: Vec<usize>,
-    /// as they were made
+    /// touches in order
     pub made: Vec<ProbedTouch>,
-    /// what the mesh becomes when more than 2 N is measured
+    /// mesh after a force above 2 N
     pub after: Option<TriMesh>,
-    /// height of the tip in B when it was wanted to end, and the least since then, m
+    /// height of the tip in B at the wish to end, and the least since then, m
     pub since_then: Option<[f64; 2]>,
     /// the true part in its cell, and how near to it the centre of the ball came, m
     pub part: Option<(Plate, RobotCell)>,

@@ -32,9 +32,9 @@ pub struct Constant {
     pub item: String,
     /// in capitals
     pub name: String,
-    /// as it is written
+    /// in the spelling of the file
     pub value: String,
-    /// of its own; empty where it has none
+    /// of its own; empty if it has none
     pub comment: String,
     /// index of the field below it, which it is a value of
     pub of: usize,
@@ -51,7 +51,7 @@ pub struct Field {
     pub name: String,
     /// when nobody sets it
     pub default: Option<String>,
-    /// with the largest length, where there is one
+    /// with the largest length, if there is one
     pub comment: String,
 }
 
@@ -66,7 +66,7 @@ pub enum Length {
     Fixed(usize),
 }
 
-/// Types that need no definition, and what they are in Rust.
+/// Types without a definition, with their Rust types.
 pub const BASIC: [(&str, &str); 14] = [
     ("bool", "bool"),
     ("byte", "u8"),

@@ -12,7 +12,7 @@ const NO_NPM: &str = "feature `web` needs npm (Debian: apt-get install npm; http
 pub fn build(web: &Path, out: &Path) -> Result<String, Box<dyn Error>> {
     let place = out.join("web");
     let sources = files(web, Path::new(""))?;
-    // what was removed is not to be built
+    // removed files must not stay in the build
     for old in ["src", "dist"] {
         remove(&place.join(old))?;
     }
@@ -23,7 +23,7 @@ pub fn build(web: &Path, out: &Path) -> Result<String, Box<dyn Error>> {
         fs::copy(web.join(source), to)?;
     }
     println!("cargo::rerun-if-changed={}", web.display());
-    // what it is built with changes seldom
+    // the build's packages change seldom
     let lock = fs::read(place.join("package-lock.json"))?;
     let installed = place.join("installed.lock");
     if fs::read(&installed).ok().as_ref() != Some(&lock) {
@@ -67,7 +67,7 @@ fn remove(folder: &Path) -> io::Result<()> {
     }
 }
 
-/// The files below a folder, from there; without what was installed or built.
+/// The files below a folder, relative to it, except installed packages and build results.
 fn files(root: &Path, folder: &Path) -> io::Result<Vec<PathBuf>> {
     let mut found = Vec::new();
     for entry in fs::read_dir(root.join(folder))? {

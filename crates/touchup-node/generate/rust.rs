@@ -1,11 +1,11 @@
-//! Messages as Rust: structs, and what the macros in `src/ros/r2r` make conversions and stand-ins
-//! of.
+//! Messages as Rust: structs, and the input of the macros in `src/ros/r2r`, which make conversions
+//! and stand-ins.
 
 use super::definition::{BASIC, Constant, Field, Length, Message};
 
-/// The packages that r2r has where ROS is sourced alone.
+/// Packages that r2r provides only with ROS sourced.
 const STAND_INS: [&str; 2] = ["std_srvs", "touchup_msgs"];
-/// What an empty message has on the wire, one byte.
+/// The one byte of an empty message on the wire.
 const EMPTY: &str = "structure_needs_at_least_one_member";
 
 /// The structs, their constants and names.
@@ -215,7 +215,7 @@ fn default(field: &Field) -> String {
     format!("            {}: {value},\n", raw(&field.name))
 }
 
-/// A value as Rust writes it. What Rust does not take the compiler refuses.
+/// A value as a Rust literal; the compiler refuses a bad one.
 fn literal(item: &str, value: &str) -> String {
     match item {
         "string" => format!("{:?}", value.trim_matches(['"', '\''])),
@@ -256,8 +256,8 @@ fn raw(name: &str) -> String {
     }
 }
 
-/// For `message!` and `service!`: each message and service, what r2r calls it, and the fields on
-/// both sides.
+/// For `message!` and `service!`: each message and service, its name in r2r, and the fields on both
+/// sides.
 pub fn conversions(messages: &[Message]) -> String {
     let lines = messages.iter().map(|message| {
         let fields = message
@@ -311,7 +311,7 @@ fn path(message: &Message) -> String {
     format!("{module}::{package}::{kind}::{file}{end}")
 }
 
-/// For `message!`, `service!` and `action!`: what r2r makes where ROS is sourced alone, as modules.
+/// For `message!`, `service!` and `action!`: the modules that r2r makes only with ROS sourced.
 pub fn stand_ins(messages: &[Message]) -> String {
     let modules = STAND_INS.map(|package| {
         let kinds = ["msg", "srv", "action"].map(|kind| {

@@ -1,10 +1,10 @@
 //! The arm itself: it follows a velocity with a limited acceleration, bends against the part, and
 //! measures the contact force.
 //!
-//! The encoders say where the tip would be if nothing bent, x_c; the ball is at x, where the part
-//! lets it be, and the part pushes with K (x − x_c). Across the normal friction holds the ball
-//! back. In force mode the velocity along one axis comes from the force: v = (F − f) / (4 K τ),
-//! which settles without ringing for a delay τ.
+//! The encoders give the place of the tip without bending, x_c; the ball is at x, outside the part,
+//! and the part pushes with K (x − x_c). Across the normal friction holds the ball back. In force
+//! mode the velocity along one axis comes from the force: v = (F − f) / (4 K τ), which settles
+//! without ringing for a delay τ.
 
 use std::collections::VecDeque;
 
@@ -75,15 +75,15 @@ pub struct Body<'a> {
     forces: VecDeque<Vector3<f64>>,
     /// N in the flange
     tare: Vector3<f64>,
-    /// what the controller takes off for the payload
+    /// payload that the controller subtracts
     pub configured_payload: Payload,
     waiting: VecDeque<(f64, Motion, Option<Force>)>,
     motion: Motion,
     force: Option<Force>,
-    /// of the part, upwards in O, m; and where it is on its way to
+    /// height of the part in O, m; and the height that it moves to
     raised: f64,
     raised_to: f64,
-    /// of the panel: each velocity of a program is scaled by it, 0 to 1
+    /// speed slider of the panel, a factor of each velocity of a program, 0 to 1
     pub slider: f64,
     /// of the sensor along z of the flange, N/s
     pub drift: f64,
@@ -154,7 +154,7 @@ impl<'a> Body<'a> {
         (self.spike, self.spike_force) = (SPIKE, force);
     }
 
-    /// The sensor drifts no more, and what it has drifted is gone.
+    /// Ends the drift of the sensor and removes its offset.
     pub fn settle(&mut self) {
         (self.drift, self.drifted) = (0.0, 0.0);
     }
@@ -180,7 +180,7 @@ impl<'a> Body<'a> {
             + Vector3::z() * self.drifted
     }
 
-    /// What is taken for the part's, N in B.
+    /// Force that the controller attributes to the part, N in B.
     fn compensated(&self) -> Vector3<f64> {
         self.flange().rotation * (self.unweighed() - self.tare)
     }
@@ -264,7 +264,7 @@ impl<'a> Body<'a> {
         self.forces.front().copied().unwrap_or_default()
     }
 
-    /// N, of the part on the tip, without what the sensor adds.
+    /// Force of the part on the tip, N, without errors of the sensor.
     pub fn true_force(&self) -> f64 {
         self.forces.back().map_or(0.0, Vector3::norm)
     }

@@ -1,5 +1,5 @@
-//! What of a UR's controller the client sees: registers, the program that it uploads, the safety
-//! system, and what goes wrong.
+//! The controller as its client sees it: registers, the uploaded program, the safety system, and
+//! faults.
 
 use std::collections::VecDeque;
 
@@ -13,17 +13,15 @@ use super::states::States;
 
 /// From the end of an upload to the first cycle of the program, s.
 const START: f64 = 20e-3;
-/// While a program plays and the client says nothing, the clock is asked this often for a period
-/// that it may not give.
+/// Requests for a period that the clock refuses while a program plays and its client is silent.
 const QUIET_LOOKS: u32 = 40;
-/// The same while the arm moves, where its next order may be late.
+/// The same while the arm moves and its next order may be late.
 const QUIET_LOOKS_MOVING: u32 = 200;
-/// The clock goes at most this far beyond the last word of the client, s: farther than to where the
-/// client brakes because it hears no order, and not as far as to where the watchdog stops the
-/// program.
+/// Largest lead of the clock over the last word of the client, s: beyond the time at which the
+/// client brakes for lack of orders, and below the time at which the watchdog stops the program.
 const AHEAD: f64 = 80e-3;
 
-/// Where the program of the client counts the cycles of its main loop, and by what line it does.
+/// Register of the main loop's cycle counter in the client's program, and the line that writes it.
 const COUNT: usize = 19;
 const COUNTS: &str = "write_output_integer_register(19, cycle)";
 
@@ -37,7 +35,7 @@ pub enum Safety {
     Safeguard,
 }
 
-/// What of the connections does not work.
+/// Faults of the connections.
 #[derive(Clone, Copy, Default)]
 pub struct Faults {
     /// no states go out
@@ -48,17 +46,17 @@ pub struct Faults {
     pub is_unplugged: bool,
     /// the program hangs
     pub is_stuck: bool,
-    /// its main loop hangs as soon as it is ready for the next command: each is taken and none is
-    /// read, and its threads live
+    /// its main loop hangs as soon as it is ready for the next command: it takes each and reads
+    /// none, and its threads live
     pub is_hung: bool,
-    /// its main loop takes so many periods for a cycle where it is more than one
+    /// periods of one cycle of its main loop, if more than one
     pub slow: u64,
-    /// the thread of its motion has ended, and its main loop lives: commands are read, and none is
-    /// followed
+    /// the thread of its motion has ended and its main loop lives: it reads commands and follows
+    /// none
     pub is_tired: bool,
     /// the dashboard does not answer
     pub is_mute: bool,
-    /// states come so much later, s
+    /// delay of states, s
     pub states_late: f64,
     /// so do orders, s
     pub orders_late: f64,
@@ -66,7 +64,7 @@ pub struct Faults {
     pub is_dead: bool,
 }
 
-/// The program of the client, as far as it is interpreted.
+/// The interpreted part of the client's program.
 #[derive(Default)]
 struct Program {
     is_running: bool,
@@ -74,7 +72,7 @@ struct Program {
     is_paused: bool,
     /// s
     starts_at: Option<f64>,
-    /// a command was run to its end and its number is still in the register
+    /// a finished command whose number is still in the register
     is_handled: bool,
     /// s; from `setWatchdog`
     watchdog: Option<f64>,
@@ -82,8 +80,8 @@ struct Program {
     /// a motion that has to end before its command has: m/s² of braking
     braking: Option<f64>,
     velocity: Option<Motion>,
-    /// what the thread of `speedL` is at: the velocity, and when it takes the next, s; without a
-    /// time it does so when it has reached that
+    /// state of the thread of `speedL`: the velocity, and the time of the next one, s; without a
+    /// time, when it has reached that velocity
     speeding: Option<(Motion, Option<f64>)>,
     /// how long it stays at one, s
     speed_time: f64,
@@ -124,7 +122,7 @@ pub struct Controller<'a> {
     pub owner: Option<u64>,
     /// the safety system keeps the arm slow
     pub is_reduced: bool,
-    /// whether its watchdog counts while the program is paused; unknown of a real one
+    /// whether its watchdog counts while the program pauses; unknown of a real one
     pub watchdog_counts_paused: bool,
     /// periods between two states
     every: u64,
@@ -206,7 +204,7 @@ impl<'a> Controller<'a> {
 
     /// The client has written the register of commands.
     fn hear(&mut self, id: i32) {
-        // an earlier command that it has not read yet is dropped
+        // an unread earlier command drops out
         if self.is_heard && matches!(self.ints_in[0], 6 | 10) && self.ints_in[0] != id {
             self.record
                 .event(&format!("command {} is never read", self.ints_in[0]));
@@ -221,8 +219,8 @@ impl<'a> Controller<'a> {
     }
 
     /// Whether another period may pass. While a program of the client plays, one passes when the
-    /// client has answered the last. While a command is run it says nothing, and now and then it
-    /// waits for another state before it does.
+    /// client has answered the last. During a command the client is silent, and now and then waits
+    /// for another state first.
     pub fn may_tick(&mut self) -> bool {
         let id = self.ints_in[0];
         let is_at_work =
@@ -263,7 +261,7 @@ impl<'a> Controller<'a> {
         self.record.line(&self.body);
     }
 
-    /// The command in the registers is executed at once, also what an earlier program left there.
+    /// Executes the command in the registers at once, even one of an earlier program.
     fn start_program(&mut self) {
         if self
             .program
@@ -300,7 +298,7 @@ impl<'a> Controller<'a> {
         self.body.brake();
     }
 
-    /// The arm stands, and the program does not go on until it is resumed.
+    /// Halts the arm; the program goes on after `resume`.
     pub fn pause(&mut self, why: &str) {
         if self.is_playing() {
             self.record.event(&format!("program pauses: {why}"));
@@ -309,7 +307,7 @@ impl<'a> Controller<'a> {
         }
     }
 
-    /// Its threads go on where they were.
+    /// Continues its threads.
     pub fn resume(&mut self) {
         if self.program.is_paused && self.safety == Safety::Normal {
             self.record.event("program resumes");
@@ -381,8 +379,7 @@ impl<'a> Controller<'a> {
         }
     }
 
-    /// The thread that `speedL` starts: it takes a new velocity only when it is done with the one
-    /// before.
+    /// The thread that `speedL` starts: it takes a new velocity only after the one before.
     fn speed(&mut self) {
         if self.faults.is_tired {
             return self.body.follow(Motion::rest(HARD_STOP), None);
@@ -474,7 +471,7 @@ impl<'a> Controller<'a> {
                 self.body.configured_payload = payload;
                 self.record.event(&format!("payload {} kg", payload.mass));
             }
-            // how force mode is tuned is not simulated
+            // the tuning of force mode has no model
             20 | 21 => self
                 .record
                 .event(&format!("set {id}: {:?}", &self.doubles_in[..4])),
@@ -511,7 +508,7 @@ impl<'a> Controller<'a> {
     }
 }
 
-/// The first of what is on its way, where its time has come.
+/// The first one under way, if it is due.
 fn due<T>(coming: &mut VecDeque<(f64, T)>, now: f64) -> Option<T> {
     let is_due = coming.front().is_some_and(|(at, _)| *at <= now);
     is_due

@@ -1,12 +1,11 @@
-//! What somebody at the panel, at the cable or at the part does, a line each; and the answers of
-//! the dashboard.
+//! Acts of a person at the panel, at the cable or at the part, a line each; and the answers of the
+//! dashboard.
 
 use touchup_method::stylus::Payload;
 
 use super::controller::{Controller, Safety};
 
-/// What a line asks for. Connections are ended by whoever has them: `drop`, `undash` and `die` only
-/// say so here.
+/// Executes a line. Owners of connections end them: `drop`, `undash` and `die` only say so here.
 #[expect(clippy::too_many_lines)]
 pub fn happen(controller: &mut Controller, line: &str) {
     controller.record.event(line);

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use super::body::Body;
 
-/// Each line is there to be read when its period has passed.
+/// Record whose lines are readable once their period has passed.
 pub struct Record {
     out: Option<File>,
     event: String,
@@ -43,7 +43,7 @@ impl Record {
             "{time:.4},{:.7},{:.7},{:.7},{speed:.7},{turn:.7},{force:.3},{event}\n",
             place.x, place.y, place.z
         );
-        // a record that cannot be written ends the run of its reader, by its deadline
+        // an unwritable record ends its reader's run by the deadline
         let _ = out.write_all(line.as_bytes());
     }
 }

@@ -1,8 +1,8 @@
-//! Writes what every run of the fuzz targets begins from: `seeds FOLDER`.
+//! Writes the seeds of the fuzz targets: `seeds FOLDER`.
 
 use std::path::PathBuf;
 
-// has what the counters at every branch call
+// provides the counters that every branch calls
 #[cfg(feature = "guided")]
 use libfuzzer_sys as _;
 

@@ -1,5 +1,5 @@
-//! A point cloud of any kind: what is read has as many points as the bytes can hold. The surface
-//! through them is left out: its grid takes longer than all else.
+//! A point cloud of any kind: the reader returns at most as many points as the bytes can hold. The
+//! surface through them stays out: its grid takes longer than all else.
 
 use crate::file;
 use touchup_io::mesh_file::{MeshOrPoints, MeshUnit, read_mesh_or_points};

@@ -1,4 +1,4 @@
-//! A file of features, which comes back from the one that is written of it.
+//! A file of features; writing and reading it again gives the same features.
 
 use crate::file;
 use touchup_io::features_file::{read_features, write_features};

@@ -1,5 +1,5 @@
-//! A mesh file of either kind: what is read has places alone, and comes back from the file that is
-//! written of it.
+//! A mesh file of either kind: the result has finite places alone, and writing and reading it again
+//! gives the same mesh.
 
 use crate::{assert_is_somewhere, file, place};
 use touchup_io::mesh_file::{MeshUnit, read_mesh, read_vertex_columns, write_mesh};

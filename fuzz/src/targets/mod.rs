@@ -1,4 +1,4 @@
-//! The targets: each takes any bytes, and panics if what its first line claims does not hold.
+//! The targets: each takes any bytes, and panics if the claim of its first line fails.
 
 pub mod check_record;
 pub mod cloud;

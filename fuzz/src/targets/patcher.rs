@@ -11,7 +11,7 @@ fn patch(bytes: &mut Unstructured) -> Result<()> {
     let scan = closed_box([4e-3, 3e-3, 2e-3], 3);
     let tree = FaceTree::new(&scan);
     let mut params = PatcherParams::new(BALL.radius, BALL.stiffness, 0.05e-3);
-    // coarse: what is to hold does so at any tolerance, and a run takes milliseconds
+    // coarse: the claim holds at any tolerance, and a run takes milliseconds
     params.tolerance = BALL.radius / 16.0;
     params.free_space = bytes.arbitrary()?;
     if bytes.arbitrary()? {

@@ -1,4 +1,4 @@
-//! A scene: what is accepted makes settings that the rooms take or refuse by name.
+//! A scene: an accepted one makes settings that the rooms take or refuse by name.
 
 use crate::closed_box;
 use touchup_method::haptic::Refiner;

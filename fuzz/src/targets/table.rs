@@ -1,5 +1,4 @@
-//! The tables that are read: pairs of points, static poses, touches, and the lines of the touches
-//! of an arm.
+//! The tables with readers: pairs of points, static poses, touches, and the touch lines of an arm.
 
 use crate::file;
 use touchup_io::probed_touches_file::read_probed_touches;

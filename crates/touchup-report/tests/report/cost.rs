@@ -112,7 +112,7 @@ fn curves_of(figure: &Figure) -> &[Series] {
 fn the_text_reports_hits_and_misses_as_measured() {
     let mut cost = made_up();
     let text = cost.chapter().text.join("\n");
-    // 180 ns where the law says 160
+    // 180 ns against 160 by the law
     assert!(
         text.contains(
             "3 µs (50000 faces, edges of 3.00 mm) to 4 µs (50000 faces, edges of 0.10 mm)"
@@ -238,7 +238,7 @@ fn recordings_are_drawn_against_edge_and_faces_beside_the_peer() {
     assert_eq!(faces.len(), 5);
 }
 
-/// A peer whose index has become wrong would be timed for nothing.
+/// A wrong index of the peer would make its timing worthless.
 #[test]
 fn the_index_of_the_peer_stays_exact() {
     let mut peer = ParryLoop::new(wavy_plate(50_000).unwrap());

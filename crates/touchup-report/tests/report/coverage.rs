@@ -1,4 +1,4 @@
-//! Coverage: what is counted, against cases worked by hand, and a run from end to end.
+//! Coverage: the counts against cases worked by hand, and a run from end to end.
 
 use touchup_report::coverage::{CoverageKind, CoverageParams, KindInWorld, StatedNumber, coverage};
 use touchup_report::{Effort, TableCell};

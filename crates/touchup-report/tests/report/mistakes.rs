@@ -1,4 +1,4 @@
-//! Mistakes: what is counted, against cases worked by hand, and a run from end to end.
+//! Mistakes: the counts against cases worked by hand, and a run from end to end.
 
 use touchup_features::diagnose::{InputCause, InputFinding};
 use touchup_report::Effort;

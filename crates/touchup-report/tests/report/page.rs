@@ -150,7 +150,7 @@ fn text(files: &[OutputFile], name: &str) -> String {
     String::from_utf8(file.bytes.clone()).unwrap()
 }
 
-/// Tags, in order, with quotes heeded; fails on what XML does not allow.
+/// Tags in order, respecting quotes; fails on anything that XML forbids.
 fn assert_balanced(xml: &str, name: &str) {
     let mut open: Vec<String> = Vec::new();
     let mut rest = xml;
@@ -304,7 +304,7 @@ fn numbers_come_back_from_the_csv_to_the_last_digit() {
     let (x, y) = (0.1 + 0.2, 1.0 / 3.0);
     assert_eq!(numbers(lines[1]), [x, 0.9 * x, 1.2 * x, y, y, y]);
     assert_eq!(numbers(lines[2])[3], 5e22);
-    // what is no number is nothing
+    // a word in place of a number is an empty cell
     assert!(
         text(&files, "log.csv")
             .lines()

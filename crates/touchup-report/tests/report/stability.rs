@@ -1,5 +1,5 @@
-//! The stability part of the report: what is promised of the default integrator holds, and what is
-//! known to fail is seen to.
+//! The stability part of the report: the promises of the default integrator hold, and the known
+//! failures of the others show.
 
 use touchup_report::Effort;
 use touchup_report::stability::{Integrator, RunEnding, bounded_steps, stability};
@@ -66,7 +66,7 @@ fn the_default_is_stable_everywhere_and_explicit_euler_is_not() {
         "default on meshes: stable from {:?}",
         measured.default_stable_from_quality()
     );
-    // triangles thinner than the guard's limit of 0.15 follow a touch, too, if they were scanned so
+    // scanned triangles thinner than the guard's limit of 0.15 follow a touch, too
     assert!(
         measured
             .default_stable_from_quality()

@@ -47,7 +47,7 @@ fn a_gaussian_process_without_noise_goes_through_its_data() {
             "{point}"
         );
     }
-    // far away nothing is known, and the mean is that of the prior
+    // far from all data the mean is that of the prior
     assert!(process.mean(&Point3::new(1.0, 0.0, 0.0)).abs() < 1e-300);
 }
 
@@ -193,7 +193,7 @@ fn the_95th_percentile_of_the_normals_is_that_of_the_area() {
             (error.normal_p95_deg - expected_deg).abs() < 1e-6,
             "{error:?}"
         );
-        // points of the mesh are spread at random over it
+        // points of the mesh lie at random over it
         let mean_deg = lean_deg * 2.0 * raised.len() as f64 / f64::from(cells);
         assert!(
             (error.normal_mean_deg / mean_deg - 1.0).abs() < 0.1,
@@ -215,8 +215,8 @@ fn a_tilt_is_measured_where_it_was_touched() {
     let region =
         TouchedRegion::of((0..=100).map(|i| Point3::new(10e-3, 5e-3 + 0.1e-3 * f64::from(i), 0.0)));
     let error = TouchedError::of(&mesh, &truth, &FaceTree::new(&truth), &region).unwrap();
-    // touched is x = 10 ± 1 mm; points of the mesh are spread at random over it, so that their mean
-    // is known to a few %
+    // the touched region is x = 10 ± 1 mm; points of the mesh lie at random over it, so that their
+    // mean has an error of a few %
     assert!((error.mesh_to_part_mean_mm - 0.1).abs() < 2e-3, "{error:?}");
     // perpendicular to the tilted mesh: 0.1 cos(atan 0.01)
     assert!(
@@ -262,7 +262,7 @@ fn what_cannot_be_fitted_is_not() {
     assert_eq!(straight_line(&[(1.0, 2.0), (1.0, 3.0)]), None);
     // all alike: a line, but nothing to explain
     assert_eq!(fit_decay(&[0.5; 4]).unwrap().power.r_squared, None);
-    // y = 1, 2, 2 at x = 0, 1, 2: slope 1/2, offset 7/6, 1/6 of 2/3 is left
+    // y = 1, 2, 2 at x = 0, 1, 2: slope 1/2, offset 7/6, residual 1/6 of 2/3
     let line = straight_line(&[(0.0, 1.0), (1.0, 2.0), (2.0, 2.0)]).unwrap();
     assert!((line.slope - 0.5).abs() < 1e-15 && (line.offset - 7.0 / 6.0).abs() < 1e-15);
     assert!(
@@ -371,7 +371,7 @@ fn whole_scans_are_measured_and_reported() {
         "{:?}",
         sheet.before
     );
-    // each contact point pulls down what lies behind it too, where the ball does not come again
+    // each contact point also pulls down the surface behind it, which the ball does not reach again
     assert!(sheet.of(RefineMethod::ContactPoints).unwrap().mean_mm() < 0.4);
     for method in [
         RefineMethod::HAPTIC,

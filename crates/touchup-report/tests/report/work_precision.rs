@@ -1,5 +1,5 @@
-//! The integrators that the report compares: their orders, their counts, and the reference they are
-//! measured by, against closed forms.
+//! The integrators of the report: their orders, their counts, and their reference, against closed
+//! forms.
 
 use nalgebra::Vector3;
 use touchup_method::haptic::FaceState;
@@ -38,7 +38,7 @@ fn the_reference_agrees_with_the_closed_form_however_stiff() {
         for from in [3.0, -2.0, 0.1] {
             let problem = at_half_of_f_max(h_min_m, from);
             let found = reference(&problem).unwrap().b.z;
-            // what the report relies on: 1e-12 of h_min
+            // the report relies on 1e-12 of h_min
             let off = (found - travel_at_half(&problem, from)).abs() / h_min_m;
             assert!(
                 off < 1e-12,
@@ -50,8 +50,8 @@ fn the_reference_agrees_with_the_closed_form_however_stiff() {
 
 #[test]
 fn the_reference_turns_the_normal_by_the_impulse_applied() {
-    // tan(θ/2) falls by e^(−β|F|J), J = F·n t − s/α while n hardly turns; here it is held fast by a
-    // tiny dt of a deep tip
+    // tan(θ/2) falls by e^(−β|F|J), J = F·n t − s/α while n hardly turns; a tiny dt of a deep tip
+    // holds it fast here
     let tilt: f64 = 0.6;
     let problem = Problem {
         h_min_m: PAPER_H_MIN_M,
@@ -135,7 +135,7 @@ fn without_friction_one_exact_step_is_the_solution_and_no_explicit_one_is() {
         }
         let euler = method_error(Method::Euler, &problem, right);
         let runge_kutta = method_error(Method::RungeKutta, &problem, right);
-        // eight decades above what is asked of the exact ones
+        // eight decades above the bound for the exact ones
         assert!(
             euler > 1e-5 * h_min_m && runge_kutta > 1e-5 * h_min_m,
             "{euler} {runge_kutta}"
