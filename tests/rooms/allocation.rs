@@ -13,7 +13,7 @@ use touchup_report::allocations::asked;
 
 use crate::common::{grid, within};
 
-/// Requests of this thread so far; to ask is one more.
+/// Requests of this thread up to now; asking adds one.
 fn requests() -> u64 {
     asked().unwrap().requests
 }

@@ -1,5 +1,5 @@
-//! What the tests of this program ask of the allocator: counted as `touchup report` counts it, and
-//! the largest request of each thread.
+//! Allocator requests of the tests of this program: counts as in `touchup report`, and the largest
+//! request of each thread.
 
 use std::alloc::{GlobalAlloc, Layout};
 use std::cell::Cell;

@@ -86,7 +86,7 @@ const HALF: i32 = 10;
 /// Radius of the ball, m.
 const RADIUS: f64 = 1.5e-3;
 
-/// All that is said of the one touch of [`Case`].
+/// The warning about the one touch of [`Case`].
 const FEW: &str = " WARN touchup::cli::common::refinement: perhaps: only 1 place of the part was touched; touch more of it: so few fit almost anywhere, \
                    and nothing can be said of poses, tip and clock\n";
 
@@ -468,8 +468,8 @@ fn the_header_of_the_wrench_names_its_axes() {
     );
 }
 
-/// The frames are known only when both topics have begun; messages read before are not lost, nor
-/// are they kept for ever.
+/// The frames are known only when both topics have begun; earlier messages wait for that, and not
+/// for ever.
 #[test]
 fn a_topic_that_begins_late_loses_no_message() {
     let case = Case::new();
@@ -635,8 +635,8 @@ fn wrong_flags_are_2_before_anything_is_read() {
     assert!(!case.path("out.ply").exists());
 }
 
-/// Nobody has told the radius of a scene that does not name it, whoever asks; refined by a ball of
-/// 1.5 mm, a hole is found too small.
+/// A scene without a radius has none for any verb; refined by a ball of 1.5 mm, a hole comes out
+/// too small.
 #[test]
 #[expect(clippy::too_many_lines)]
 fn a_scene_that_names_no_radius_has_told_none() {
@@ -758,7 +758,7 @@ fn doctor_says_what_was_told_of_tip_and_scan_and_by_what() {
     assert_eq!(told["scan_noise_mm"], number(0.3, "flag"));
 }
 
-/// What a node prints before it is on the network.
+/// Output of a node before it joins the network.
 #[cfg(feature = "ros")]
 #[test]
 #[expect(clippy::too_many_lines)]
@@ -808,7 +808,7 @@ fn a_node_says_what_was_told_of_tip_and_scan_and_by_what() {
         ]),
         "tip: radius 1.2500 mm (flag), stiffness 25.0000 N/mm (scene); scan: noise 0.600 mm (default)"
     );
-    // a session keeps the radius that was told
+    // a session keeps the told radius
     let newest = fs::read_dir(case.path("sessions"))
         .unwrap()
         .map(|entry| entry.unwrap().path())
@@ -888,7 +888,7 @@ fn bad_input_is_3_in_one_line_that_names_it() {
     assert!(!case.path("out.ply").exists());
 }
 
-/// Sound input is processed; the rest is counted, named, and shown by the exit code.
+/// Refining uses the sound input and counts and names the rest; the exit code shows it.
 #[test]
 fn losses_are_4_and_named() {
     let case = Case::new();
@@ -943,7 +943,7 @@ fn losses_are_4_and_named() {
     );
 }
 
-/// What a new user gets wrong first: another clock, another frame, no contact at all.
+/// First mistakes of a new user: another clock, another frame, no contact at all.
 #[test]
 fn a_recording_that_moves_nothing_reports_the_reason() {
     let case = Case::new();
@@ -1113,7 +1113,7 @@ fn a_scene_without_an_end_is_refused_before_it_is_all_in_memory() {
 // ---- init
 // -------------------------------------------------------------------------------------------------------
 
-/// A scene that `init` writes is taken as it is, and each of its sources is the scene.
+/// `refine` takes a scene of `init` unchanged, and each of its sources is the scene.
 #[test]
 #[expect(clippy::too_many_lines)]
 fn init_writes_a_scene_that_refine_takes() {
@@ -1400,8 +1400,7 @@ fn step_answers_each_line_in_order_and_goes_on_after_a_bad_one() {
 // ---- report
 // -----------------------------------------------------------------------------------------------------
 
-/// The program is copied into a folder of its own, with a script beside it that replaces
-/// `touchup-report`.
+/// The program in a folder of its own, with a script beside it in place of `touchup-report`.
 #[test]
 fn report_passes_its_arguments_to_a_program_of_its_own_and_ends_with_its_code() {
     let folder = tempfile::tempdir().unwrap();

@@ -10,7 +10,7 @@ use touchup::sim::Plate;
 
 const HEADER: &str = "name,kind,quantity,nominal_mm,tolerance_mm,lower_deviation_mm,upper_deviation_mm,center_x_mm,center_y_mm,center_z_mm";
 
-/// A folder with features.json and, once it is asked for, a drawing.
+/// A folder with features.json and, on request, a drawing.
 struct Part {
     folder: tempfile::TempDir,
 }
@@ -64,7 +64,7 @@ impl Part {
         self.inspect(&[&["--nominal", "n.csv"], more].concat())
     }
 
-    /// … as JSON.
+    /// Inspects against rows of a drawing; returns the characteristics of the JSON.
     fn characteristics(&self, rows: &[&str], more: &[&str]) -> Vec<Value> {
         let output = self.against(rows, &[&["--json"], more].concat());
         let record: Value =
@@ -412,8 +412,7 @@ fn features_of_a_cad_mesh_are_nominal_values() {
     assert_eq!(record["without_characteristic"], json!([3]));
 }
 
-/// A flag whose hole was measured by the second to the fourth of its touches, which are numbered
-/// from 1 on.
+/// A flag whose hole the second to the fourth of its touches measured, numbered from 1 on.
 #[test]
 #[expect(clippy::too_many_lines)]
 fn the_folder_of_a_probing_is_inspected_by_the_features_of_its_flags() {

@@ -1,5 +1,5 @@
-//! Registration by features: known motions of real parts are found from anywhere, and what is not
-//! determined is reported.
+//! Registration by features: finds known motions of real parts from anywhere, and reports
+//! undetermined ones.
 
 use std::path::{Path, PathBuf};
 
@@ -133,7 +133,7 @@ fn false_ones(part: &Part, count: usize, rng: &mut Pcg64) -> Vec<Feature> {
     (0..count).map(fake).collect()
 }
 
-/// Three tenths of the features are left out.
+/// The features without three tenths of them.
 fn subset(features: &[Feature], rng: &mut Pcg64) -> Vec<Feature> {
     features
         .iter()
@@ -242,7 +242,7 @@ fn moving_either_side_moves_the_answer() {
 
 // The flange crs_ee3 looks the same after half a turn about its axis but for one dowel hole in its
 // lower side, at x = 25 mm: four counterbored holes on a square, two on a line, and one in the
-// middle. After a quarter of a turn the two on the line lie where there is no hole.
+// middle. After a quarter of a turn the two on the line meet no hole.
 #[test]
 fn a_flange_is_ambiguous_without_the_one_hole_that_breaks_its_symmetry() {
     let Some(part) = Part::read("crs_ee3.stl", MeshUnit::Metre) else {
@@ -405,8 +405,8 @@ fn failed_alignments_say_what_to_do() {
     );
 }
 
-/// A body of revolution about z, of so many sides: corners of its outline as radius and height, m,
-/// from the axis outside and up; where it begins and ends at the same radius above 0 it has a bore.
+/// A body of revolution about z, of `sides` sides: corners of its outline as radius and height, m,
+/// from the axis outside and up; with equal radii above 0 at both ends it has a bore.
 fn turned_part(outline: &[[f64; 2]], sides: u32) -> TriMesh {
     let is_open = outline[0][0] == 0.0;
     let ring = |[radius, height]: [f64; 2]| {
@@ -455,8 +455,7 @@ fn mm(outline: &[[f64; 2]]) -> Vec<[f64; 2]> {
         .collect()
 }
 
-// A continuum of motions, of which any one would be as good: the axis is that of the body, z before
-// it was moved.
+// A continuum of equally good motions: the axis is that of the body, z before the motion.
 #[test]
 fn a_part_of_revolution_is_reported_free_to_turn() {
     let bar = mm(&[
@@ -741,7 +740,7 @@ fn the_command_line_lists_alternatives_and_takes_one() {
         Some(2)
     );
 
-    // no features: what to do instead
+    // no features: the error names the remedy
     std::fs::write(&mesh, "ply\nformat ascii 1.0\nelement vertex 3\nproperty double x\nproperty double y\nproperty double z\n\
                            element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n9 0 0\n0 9 0\n3 0 1 2\n").unwrap();
     let answer = call(&[]);
@@ -806,7 +805,7 @@ fn the_command_line_reports_the_axis_of_a_free_turn() {
         .as_array()
         .unwrap_or_else(|| panic!("{answer}"));
     assert!(axis[2].as_f64().unwrap().abs() > 0.9999, "{answer}");
-    // of a body of 64 sides any turn is as good, within what its sides are off the circle
+    // a body of 64 sides fits at any turn, within the deviation of its sides from the circle
     let taken = call(&["--json", "--alternative", "1"]);
     assert!(
         taken.status.success(),

@@ -1,4 +1,4 @@
-//! Rigid motion from picked pairs: against motions that are known, and picks that are wrong.
+//! Rigid motion from picked pairs: against known motions, and with wrong picks.
 
 use nalgebra::{Isometry3, Point3, Rotation3, UnitQuaternion, Vector3, Vector6, vector};
 use proptest::prelude::*;
@@ -117,7 +117,7 @@ fn the_stated_uncertainty_holds() {
     }
 }
 
-/// A sigma that was given far too small is not believed against the residuals.
+/// The residuals overrule a sigma far too small.
 #[test]
 fn a_sigma_that_the_residuals_contradict_is_not_believed() {
     let pairs = pairs_of(&motion(), 0.4e-3, 1);
@@ -256,7 +256,7 @@ fn pairs_on_a_line_are_refused() {
     );
 }
 
-/// With five pairs or more the wrong one is named, whichever it is; fewer disagree.
+/// With five pairs or more the finding names the wrong one, whichever it is; fewer disagree.
 #[test]
 fn a_pair_that_does_not_fit_is_named() {
     for seed in 0..50 {

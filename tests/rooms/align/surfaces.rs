@@ -1,5 +1,4 @@
-//! Registration of points to a mesh: known motions are found, and unconstrained directions are
-//! reported.
+//! Registration of points to a mesh: it finds known motions and reports unconstrained directions.
 
 use std::f64::consts::TAU;
 
@@ -237,7 +236,7 @@ fn what_cannot_be_fitted_is_refused_with_numbers() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(16))]
 
-    /// The frame in which both are given does not matter.
+    /// The common frame of both does not matter.
     #[test]
     fn a_motion_of_both_moves_the_answer(
         axis in prop::array::uniform3(-1.0..1.0f64), angle in -3.0..3.0f64, shift in prop::array::uniform3(-0.2..0.2f64),

@@ -1,6 +1,5 @@
-//! `touchup calibrate` at the boundary of the process: a recording in another frame, with another
-//! tip and a heavy sensor, gives the mesh that the plain recording gives, once the scene is
-//! calibrated.
+//! `touchup calibrate` at the boundary of the process: with the calibrated scene, a recording in
+//! another frame, with another tip and a heavy sensor, gives the mesh of the plain recording.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -36,7 +35,7 @@ fn done(output: &Output) -> &str {
     text(&output.stdout)
 }
 
-/// Where the scan lies in space.
+/// Pose of the scan in space.
 fn pose_wo() -> Isometry3<f64> {
     Isometry3::new(vector![0.41, -0.22, 0.13], vector![0.5, -1.2, 2.0])
 }
@@ -172,7 +171,7 @@ fn turns(messages: &[Message]) -> BTreeMap<i64, UnitQuaternion<f64>> {
     turns
 }
 
-/// Each wrench that becomes a sample changed, by what `change` makes of the orientation at its
+/// The messages with each wrench of a sample replaced by `change` of it and the orientation at its
 /// stamp.
 fn changed(
     messages: &[Message],
@@ -361,7 +360,7 @@ fn a_calibrated_scene_gives_the_mesh_of_the_plain_recording() {
         println!("{bag} with {scene}: {difference:e} m");
         assert!(difference < 1e-9, "{bag}: {difference:e}");
     }
-    // a wrench in the axes of the poses is turned with them
+    // turns a wrench in the axes of the poses with them
     let turned = |r_wt: &UnitQuaternion<f64>, wrench: Wrench| Wrench {
         force: r_wt * wrench.force,
         torque: r_wt * wrench.torque,
@@ -414,7 +413,7 @@ fn results_are_printed_and_written_and_bad_data_is_3() {
         !touchup::scene::Scene::names(&new, "tip", "radius_mm") && new.contains("#radius_mm"),
         "{new}"
     );
-    // the same of a scene that is named and not there yet
+    // the same with the name of a scene that does not exist yet
     let named = name("named.yaml");
     let scan_named = [
         "calibrate",
@@ -611,7 +610,7 @@ fn points_can_be_picked_with_the_stylus() {
     assert!(text(&output.stderr).contains("4 dwells") && text(&output.stderr).contains("5 points"));
 }
 
-/// The markers of a tracker in space, where they are read in place of the pose.
+/// The markers of a tracker in space, read in place of the pose.
 #[test]
 #[ignore = "a slow proof"]
 #[expect(clippy::too_many_lines)]
@@ -674,7 +673,7 @@ fn markers_in_space_refine_as_those_in_the_frame_of_the_scan() {
         refined("made/touch.mcap", "markers.yaml"),
         refined("space.mcap", "space.yaml"),
     );
-    // markers are recorded in single precision, so that 1e-8 m is the achievable accuracy
+    // the recording holds markers in single precision, so that 1e-8 m is the achievable accuracy
     let ratio = |key: &str| space[key].as_f64().unwrap() / plain[key].as_f64().unwrap();
     assert!(plain["moved_faces"].as_u64().unwrap() > 1000, "{plain}");
     for key in ["accepted", "moved_faces", "contacts"] {

@@ -136,7 +136,7 @@ fn the_centre_is_known_no_better_than_the_weight() {
             .norm_squared()
             / 3.0
             / 100.0;
-        // p × w stays what it is where p shrinks as w grows
+        // p × w keeps its value while p shrinks as w grows
         shares.push(found.p_sc.sigma.norm() / CENTRE.norm() / (found.weight[1] / found.weight[0]));
     }
     println!(
@@ -246,8 +246,8 @@ fn wrenches_that_no_payload_explains_are_refused() {
     ));
 }
 
-/// A robot that turns to eight orientations and dwells in each for a second: the segments are
-/// found, the turning between them and the settling after it are not in them.
+/// A robot that turns to eight orientations and dwells in each for a second: the segments exclude
+/// the turning between them and the settling after it.
 #[test]
 fn static_segments_of_a_recording_are_found() {
     let mut rng = Pcg64Mcg::seed_from_u64(9);
@@ -541,8 +541,8 @@ fn swings_that_do_not_determine_the_tip_are_refused() {
         panic!("{error}")
     };
     assert!(swing_deg < 1e-3 && axis[0].abs() > 0.999_999, "{error}");
-    // to all sides, but by 4°: what lies across the shaft is seen least, since each of its axes
-    // tilts in one direction only
+    // to all sides, but by 4°: the part across the shaft shows least, since each of its axes tilts
+    // in one direction only
     let error = fitted(&swing(3000, 0.07, 1.0, 0.05e-3, 0.0, 1));
     let TipError::TooSmall {
         swing_deg, axis, ..

@@ -418,7 +418,7 @@ fn what_is_no_number_or_no_mesh_is_refused() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
-    /// Where both lie does not matter.
+    /// The common place of both does not matter.
     #[test]
     fn a_motion_of_both_changes_nothing(
         shift in prop::array::uniform3(-0.5..0.5f64), turn in prop::array::uniform3(-2.0..2.0f64),
@@ -440,7 +440,7 @@ proptest! {
             }).collect()
         };
         for (a, b) in numbers(&here).iter().zip(numbers(&there)) {
-            // coordinates of 0.5 m are rounded to 1e-16 m
+            // rounding of coordinates of 0.5 m is 1e-16 m
             prop_assert!((a - b).abs() < 1e-14, "{} {}", a, b);
         }
     }
@@ -511,7 +511,7 @@ fn a_picture_shows_too_much_in_red_on_the_side_where_it_is() {
     assert_eq!(picture, picture_of(&sides, &mesh, 1), "the same again");
 }
 
-/// A label is drawn at its place, in the box beside it the colours of paper and ink.
+/// A label stands at its place, in the box beside it the colours of paper and ink.
 #[test]
 fn a_label_marks_its_place() {
     let mesh = square(2, 0.0);
@@ -593,7 +593,7 @@ fn a_png_holds_the_pixels() {
 fn columns_come_back_by_vertex_through_repair() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.ply");
-    // vertex 0 is unused, 2 is 1 again, -0 is 0
+    // no face uses vertex 0, 2 is 1 again, -0 is 0
     let text = "ply\nformat ascii 1.0\nelement vertex 6\nproperty float touched\nproperty float x\nproperty float y\n\
                 property uchar red\nproperty float z\nelement face 2\nproperty list uchar int vertex_indices\nend_header\n\
                 9 5 5 200 5\n0.5 -0 0 1 0\n8 0 0 2 0\n1 40 0 3 0\n0 40 30 4 0\n0.25 0 30 5 0\n3 1 3 4\n3 2 4 5\n";
@@ -827,7 +827,7 @@ fn a_refined_mesh_is_reported_by_support() {
             .map(|part| (part["region"].as_str().unwrap().to_owned(), points(part)))
             .collect()
     };
-    // 3 scanned, 10 touched, 7 guessed, 5 that the ball cannot reach, which are guessed too
+    // 3 from the scan, 10 touched, 7 guessed, 5 unreachable for the ball, which are guesses too
     let support: Vec<f32> = [(0.0, 3), (1.0, 10), (2.0, 7), (3.0, 5)]
         .iter()
         .flat_map(|&(n, times)| vec![n; times])
@@ -917,7 +917,7 @@ fn bad_use_is_refused_before_any_work() {
     assert_eq!(parts_of(&missing).0, 3);
 }
 
-/// So many threads, each with its share.
+/// Runs pieces on this number of threads, each with its share.
 struct SoMany(usize);
 
 impl Workers for SoMany {

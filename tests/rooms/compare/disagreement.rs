@@ -1,5 +1,5 @@
-//! Where touch and scan disagree, of parts that are known: `touchup disagree` blames the scanner,
-//! the part or the touch.
+//! Disagreement of touch and scan on known parts: `touchup disagree` blames the scanner, the part
+//! or the touch.
 
 use std::path::PathBuf;
 use std::process::Command;
@@ -28,7 +28,7 @@ fn scanner(seed: u64) -> ScannerParams {
     }
 }
 
-/// A part that was scanned, and the part that was touched.
+/// The part of the scan, and the part of the touch.
 struct Case {
     folder: tempfile::TempDir,
 }
@@ -243,8 +243,7 @@ fn a_part_that_was_not_changed_is_not_called_changed() {
             );
             assert_eq!(area(&report, "changed part"), 0.0);
             let touched = area(&report, "agrees") + area(&report, "scanner error");
-            // noise at an edge cannot be distinguished from a small change, least of all that of a
-            // poor scanner
+            // noise at an edge looks like a small change, above all the noise of a poor scanner
             let is_poor = scanner.noise > 0.3e-3;
             let share = if is_poor { 0.06 } else { 0.04 };
             let small = |class| area(&report, class) < share * touched;
@@ -271,8 +270,8 @@ fn a_part_that_was_not_changed_is_not_called_changed() {
     }
 }
 
-/// The scan is turned by 0.15° and shifted by 0.2 mm, of which noise of 0.6 mm hides most: the
-/// reported offset is no more than that, as far as the stated deviation goes.
+/// The scan lies 0.15° and 0.2 mm off, and noise of 0.6 mm hides most of it: the reported offset is
+/// no more than that, within the stated deviation.
 fn turned_no_farther_than_known(report: &Value, seed: u64) {
     let vector =
         |name: &str| Vector3::from_fn(|i, _| report["rigid_offset"][name][i].as_f64().unwrap());
@@ -304,7 +303,7 @@ fn written_columns_match(report: &Value, case: &Case) {
     assert!((all / (area * 1e6) - 1.0).abs() < 1e-4);
 }
 
-/// Of a scan nobody knows where it was touched.
+/// The touched places of a scan are unknown.
 fn refuses_a_mesh_without_marks(case: &Case) {
     let [scan, csv] = ["scan.ply", "touches.csv"].map(|name| case.text(name));
     let unmarked = Command::new(env!("CARGO_BIN_EXE_touchup-tested"))

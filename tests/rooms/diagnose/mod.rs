@@ -1,4 +1,4 @@
-//! Mistakes made of sound recordings, and the cause that is named.
+//! Sound recordings with mistakes put in, and the cause that the finding names.
 
 use crate::common::{grid, within};
 use crate::full::either;
@@ -126,8 +126,8 @@ fn sound_input_raises_no_alarm_and_each_mistake_is_named() {
 
 /// A ball as wide as the holes of the plate (seeds 2, 6, 10, …) rests on their rims: there neither
 /// its free motion nor its stop is clear.
-// The plate's scan is open below, and a hand that reaches it from its sides touches mostly where
-// the scan has ended: beyond a rim a signed distance says nothing.
+// The plate's scan is open below, and a hand that reaches it from its sides touches mostly beyond
+// the scan: there a signed distance says nothing.
 #[test]
 fn a_part_touched_on_all_sides_of_an_open_scan_raises_no_alarm() {
     let plate = Plate::default();
@@ -268,7 +268,7 @@ fn three_touches(height: f64) -> Vec<(InputCause, bool)> {
 #[test]
 fn three_touches_are_said_to_be_few_and_nothing_is_made_of_them() {
     assert_eq!(three_touches(0.0), [(InputCause::FewContacts, false)]);
-    // farther off than a scan is wrong by where it is pressed
+    // more than a scan deviates at its touched places
     for height in [-4e-3, 4e-3] {
         assert_eq!(three_touches(height), [(InputCause::Frame, true)]);
     }

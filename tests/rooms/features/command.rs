@@ -373,7 +373,7 @@ fn features_of_the_files_are_those_of_refine() {
         assert!(folder.bytes(first) == folder.bytes(again), "{first}");
     }
 
-    // nothing that is read is written over, and nothing that is written is written over
+    // refuses to overwrite inputs and its own outputs
     let out = folder.name("out.ply");
     let flags = |features: &str, touches: &str| {
         let refine = [

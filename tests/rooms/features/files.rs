@@ -1,4 +1,4 @@
-//! Files of touches and of features: a round trip is exact, and damage is named.
+//! Files of touches and of features: a round trip is exact, and errors name the damage.
 
 use std::fs;
 
@@ -72,7 +72,7 @@ proptest! {
         write_touches(file.path(), &touches).unwrap();
         let read = read_touches(file.path()).unwrap();
         prop_assert_eq!(read.len(), touches.len());
-        // half of the last digit, and what is lost in the conversion to millimetres and back
+        // half of the last digit, and the loss of the conversion to millimetres and back
         let (length, share, weight) = (0.51e-9, 1.1e-6, 0.51e-4);
         for (a, b) in read.iter().zip(&touches) {
             let of = |t: &ProbedPoint| (t.stamp_ns, t.stroke, t.is_rejected);
@@ -86,15 +86,15 @@ proptest! {
         }
         prop_assert_eq!(read, as_written(&touches));
 
-        // as a table, what refine writes is what is made of its file
+        // refine's own table equals the table made of its file
         let [direct, made] = [(); 2].map(|()| tempfile::Builder::new().suffix(".parquet").tempfile().unwrap());
         write_touches_as_named(direct.path(), &touches).unwrap();
         ResultTable::of_touches_file(file.path()).unwrap().write(made.path()).unwrap();
         prop_assert!(fs::read(direct.path()).unwrap() == fs::read(made.path()).unwrap());
     }
 
-    /// Whatever some fields hold of a good line: it is a touch of finite numbers, or the line is
-    /// named with its error.
+    /// Any value in some fields of a good line gives a touch of finite numbers, or an error that
+    /// names the line.
     #[test]
     fn a_line_is_a_touch_or_its_error_is_named(
         changed in prop::collection::vec((0..17usize, "-?[0-9]{1,4}|[-+0-9.eE,naif ]{0,9}"), 1..4),
@@ -280,7 +280,7 @@ fn another_header_is_refused() {
     ));
 }
 
-/// The features of the drawing, one of them as if it had been touched.
+/// The features of the drawing, one of them with the marks of a touched one.
 fn features() -> Vec<Feature> {
     let plate = Plate::default().mesh(10e-6).unwrap();
     let mut features = detect(&plate, &[]).features;
@@ -345,7 +345,7 @@ fn features_come_back_bit_by_bit() {
     let bytes = fs::read(file.path()).unwrap();
     write_features(file.path(), &read).unwrap();
     assert_eq!(fs::read(file.path()).unwrap(), bytes);
-    // as a table, what refine and features write is what is made of that file
+    // the tables of refine and features equal those made of that file
     for ending in [".csv", ".parquet"] {
         let [direct, made] =
             [(); 2].map(|()| tempfile::Builder::new().suffix(ending).tempfile().unwrap());
@@ -358,7 +358,7 @@ fn features_come_back_bit_by_bit() {
     }
 }
 
-/// As the judge's README shows it: unknown values are left out.
+/// As the judge's README shows it: without unknown values.
 #[test]
 fn files_of_others_are_read() {
     let file = tempfile::NamedTempFile::new().unwrap();

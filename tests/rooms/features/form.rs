@@ -1,5 +1,5 @@
-//! Form and relations of the simulated plate with known errors in it, by touches: what was put in
-//! is found within its uncertainty.
+//! Form and relations of the simulated plate with known errors in it, by touches: the results agree
+//! with these errors within their uncertainty.
 //!
 //! `TOUCHUP_FULL=1` runs all seeds; `--nocapture` shows the numbers.
 
@@ -28,8 +28,8 @@ const LEANS: [f64; 2] = [
     0.6 * std::f64::consts::PI / 180.0,
 ];
 
-/// The plate with a through-hole out of round and a blind hole out of square: each point is moved
-/// by a small, smooth displacement.
+/// The plate with a through-hole out of round and a blind hole out of square: a small, smooth
+/// displacement moves each point.
 struct Worn {
     plate: Plate,
     /// of the blind hole, rad
@@ -59,8 +59,8 @@ fn displacement(p: &Point3<f64>, lean: f64) -> Vector3<f64> {
 }
 
 impl Worn {
-    /// A point of the plate as it is here, seen from `p`. Along the surface it goes with `p`: below
-    /// a ball the floor is straight below, at whichever height that is moved less or more.
+    /// A point of the plate after its displacement, seen from `p`. Along the surface it moves with
+    /// `p`: the floor below a ball stays straight below, whatever the displacement at its height.
     fn moved(&self, s: SurfacePoint, p: &Point3<f64>) -> SurfacePoint {
         const STEP: f64 = 1e-6;
         let slope = |axis: Vector3<f64>| {
@@ -106,8 +106,8 @@ impl Surface for Worn {
     }
 }
 
-/// Features of a part that is almost the plate, touched as in the demo, and whether the blind hole
-/// was felt all around: the hand that is caught at its rim goes on elsewhere.
+/// Features of a part that is almost the plate, touched as in the demo, and whether touches
+/// surround the blind hole: a hand that its rim catches goes on elsewhere.
 fn found(part: &dyn Surface, seed: u64) -> (Vec<Feature>, bool) {
     let stylus = StylusParams::default();
     let (
@@ -315,7 +315,7 @@ fn known_errors_of_form_and_orientation_are_found_within_their_uncertainty() {
         );
     }
     assert!(rms < 1.5, "{rms}");
-    // last, so that the others are seen
+    // last, so that the others show first
     assert_eq!(
         turned_away,
         0,

@@ -72,8 +72,8 @@ fn found(seed: u64, off: CalibrationOffset) -> Vec<Feature> {
     detect(&mesh, &touches).features
 }
 
-/// The scan smears the rims of the plate that nobody touched, and is too high there: beside what was
-/// touched is a step. Of 50 plates one has a shaft there today (seed 49); more it must not be.
+/// The scan smears the untouched rims of the plate, and is too high there: beside the touched
+/// region is a step. Of 50 plates one has a shaft there today (seed 49), the permitted maximum.
 #[test]
 fn a_smeared_rim_beside_what_was_touched_is_no_shaft() {
     let (seeds, most) = either((vec![1, 12, 35], 0), ((1..=50).collect(), 1));
@@ -87,7 +87,7 @@ fn a_smeared_rim_beside_what_was_touched_is_no_shaft() {
     assert!(wrong.len() <= most, "{wrong:?}");
 }
 
-/// While little is touched much is decided by little: the order in which faces are met must be no part of it.
+/// With few touches small differences decide: the order of the faces must play no part.
 #[test]
 fn features_do_not_depend_on_how_the_mesh_is_numbered() {
     let (mesh, touches) = touched(7, CalibrationOffset::default(), 0.25);
@@ -241,7 +241,7 @@ fn compare(table: &mut Table, truth: &TruthFeature, feature: &Feature) {
             through,
         } => {
             number("diameter", diameter, &feature.diameter, BOUND);
-            // where the ball came down to a floor
+            // if the ball came down to a floor
             if feature
                 .depth
                 .as_ref()
@@ -270,7 +270,7 @@ fn compare(table: &mut Table, truth: &TruthFeature, feature: &Feature) {
         } => {
             number("width", width, &feature.width, BOUND);
             number("length", length, &feature.length, None);
-            // where its floor was touched
+            // if the ball touched its floor
             if feature
                 .depth
                 .as_ref()
@@ -339,8 +339,8 @@ fn touched_features_are_found_within_their_stated_uncertainty() {
     let mut table = Table::default();
     let mut others = Vec::new();
     for seed in 1..=seeds() {
-        // by one and a half of what the calibration says, each sign in turn: no draws of the model
-        // under test
+        // one and a half times the deviation of the calibration, each sign in turn: no draws of the
+        // model under test
         let sign = |bit: u64| if seed >> bit & 1 == 0 { 1.5 } else { -1.5 };
         let features = found(
             seed,
@@ -387,10 +387,10 @@ fn touched_features_are_found_within_their_stated_uncertainty() {
             "{name} is off by {}",
             row.worst()
         );
-        // few errors determine a standard deviation no better than χ² allows; the floor was touched
-        // in few seeds
+        // few errors determine a standard deviation no better than χ² allows; touches reach the
+        // floor in few seeds
         let count = row.errors.len();
-        // widths in every seed, a depth where the floor was touched
+        // widths in every seed, a depth if the ball touched the floor
         assert!(
             count == seeds() as usize || name.ends_with("depth"),
             "{name}: measured in {count} seeds"
@@ -419,9 +419,9 @@ fn touched_features_are_found_within_their_stated_uncertainty() {
     assert_eq!(table.wrongly_through, 0);
 }
 
-/// The centre of the ball is where it is, for any stated radius: a ball stated 20 µm too large, ten
-/// times what the calibration says, makes bores and slots 40 µm wider and bosses 40 µm thinner, and
-/// their stated uncertainties do not show it.
+/// The centre of the ball does not depend on the stated radius: a ball stated 20 µm too large, ten
+/// times the deviation of the calibration, makes bores and slots 40 µm wider and bosses 40 µm
+/// thinner, and their stated uncertainties do not show it.
 #[test]
 #[ignore = "a slow proof"]
 #[expect(clippy::too_many_lines)]
@@ -493,9 +493,9 @@ fn a_wrong_radius_goes_twice_into_every_width_and_is_not_in_its_uncertainty() {
     );
 }
 
-/// The plate as drawn, with its surface around the blind hole and the upper 3 mm of its wall
-/// touched: how deep it is nobody felt, and what was not touched has no uncertainty beside what
-/// was. Without touches the drawing is known to its rounding.
+/// The plate of the drawing with touches on the surface around the blind hole and on the upper 3 mm
+/// of its wall: its depth stays open, and untouched numbers have no uncertainty beside touched
+/// ones. Without touches the drawing is exact to its rounding.
 #[test]
 #[expect(clippy::too_many_lines)]
 fn what_was_not_felt_is_a_bound_or_has_no_uncertainty() {
@@ -573,7 +573,7 @@ fn what_was_not_felt_is_a_bound_or_has_no_uncertainty() {
             "{feature:?}"
         );
     }
-    // neither end was felt: as long as the wall was, from a third of the way on
+    // touches of neither end: the wall alone, from a third of its height on
     let of_wall = |touch: &&ProbedPoint| touch.normal.z == 0.0 && touch.point.z < top - 0.9e-3;
     let of_wall: Vec<ProbedPoint> = touches.iter().filter(of_wall).copied().collect();
     let bound = depth(&of(&of_wall));

@@ -1,4 +1,4 @@
-//! Flatness of planes whose form is known, touched with noise.
+//! Flatness of planes of known form, touched with noise.
 
 use nalgebra::{Point3, Rotation3, Vector3};
 use rand::SeedableRng;

@@ -1,4 +1,4 @@
-//! Roundness, cylindricity and straightness of walls whose form is known, touched with noise.
+//! Roundness, cylindricity and straightness of walls of known form, touched with noise.
 
 use std::f64::consts::TAU;
 
@@ -95,8 +95,8 @@ fn section(radius: impl Fn(f64) -> f64, turn: f64) -> [f64; 2] {
 
 const HONEST: std::ops::RangeInclusive<f64> = 0.8..=1.25;
 
-/// 150 seeds determine a root mean square to 6 %. A groove is of many undulations, of which the
-/// smallest are lost in noise.
+/// 150 seeds determine a root mean square to 6 %. A groove has many undulations, and noise hides
+/// the smallest.
 #[test]
 #[ignore = "a slow proof"]
 fn roundness_is_off_by_its_uncertainty() {

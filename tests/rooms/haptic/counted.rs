@@ -1,23 +1,23 @@
-//! Drawn cases that are counted by what they could show, so that a property cannot hold vacuously.
+//! Counts of random cases by their result, so that a property cannot hold vacuously.
 
 use std::cell::Cell;
 
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
 
-/// What one drawn case could show.
+/// Result of one random case.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shown {
     /// a number that another one would not pass for
     Value,
-    /// nothing but that it is no nonsense: what happens is below a rounding of what it happens to,
-    /// or beyond the largest number
+    /// no nonsense, and no more: the effect is below a rounding of its operand, or beyond the
+    /// largest number
     Little,
-    /// it was refused, and a predicate of the test allowed that
+    /// the code refused it, and a predicate of the test allowed that
     Refused,
 }
 
-/// How many cases showed what.
+/// Number of cases for each result.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Counts {
     pub values: u32,
@@ -36,8 +36,8 @@ impl Counts {
     }
 }
 
-/// Tries a property, which panics where it does not hold, on `cases` cases; prints and returns what
-/// they showed.
+/// Tries a property, which panics if it fails, on `cases` cases; prints and returns the counts of
+/// their results.
 #[track_caller]
 pub fn tried<S: Strategy>(
     name: &str,

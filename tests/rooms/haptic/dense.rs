@@ -1,4 +1,4 @@
-//! Scans much finer than the tip: what a touch costs, and what becomes of the detail.
+//! Scans much finer than the tip: the cost of a touch, and the fate of the detail.
 
 use std::sync::Arc;
 
@@ -78,8 +78,8 @@ fn touched(scan: &TriMesh) -> (TriMesh, usize) {
     (ended.mesh().into_owned(), most)
 }
 
-/// Root mean square of how far the scan is off the part where it was touched, its texture taken
-/// off, m.
+/// Root mean square deviation of the scan from the part in the touched region, without its texture,
+/// m.
 fn left(before: &TriMesh, after: &TriMesh, texture: fn(f64, f64) -> f64) -> f64 {
     let pairs = before.positions().iter().zip(after.positions());
     let inside = pairs.filter(|(p, _)| p.x.abs().max(p.y.abs()) < TOUCHED - 1e-3);
@@ -131,8 +131,7 @@ fn the_paper_takes_every_face_as_it_is() {
     assert_eq!(engine.refiner().mesh().face_count(), scan.face_count());
 }
 
-/// The largest distance of a vertex that a face uses from another mesh, m, where it is within
-/// `TOUCHED` of the middle.
+/// The largest distance of a used vertex from another mesh, m, within `TOUCHED` of the middle.
 fn farthest(from: &TriMesh, to: &TriMesh) -> f64 {
     let tree = FaceTree::new(to);
     let used = (0..from.vertex_slots() as u32)

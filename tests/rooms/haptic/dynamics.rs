@@ -1,5 +1,5 @@
-//! The face dynamics against closed forms, laws and the paper's one-face experiment. Numbers to 50
-//! digits are compared in `tests/python/test_step.py`.
+//! The face dynamics against closed forms, laws and the paper's one-face experiment.
+//! `tests/python/test_step.py` compares numbers to 50 digits.
 
 use std::f64::consts::PI;
 
@@ -418,7 +418,7 @@ proptest! {
         let after = step(params, &face, p, size * f, 5e-3);
         let turned = FaceState { b: turn * face.b, n: turn * n };
         let turned_after = step(params, &turned, turn * p, turn * (size * f), 5e-3);
-        // where the flow amplifies (f·n < 0) by at most e^(slope t) = e^5; coordinates of
+        // an amplifying flow (f·n < 0) grows by at most e^(slope t) = e^5; coordinates of
         // millimetres, forces of 10 N
         prop_assert!((turn * after.b - turned_after.b).norm() < 1e-15);
         prop_assert!((turn * after.n - turned_after.n).norm() < 1e-12);
@@ -461,7 +461,7 @@ proptest! {
     }
 }
 
-/// Sizes of what a step is made of: all numbers, by their powers of ten.
+/// Sizes of the quantities of a step: all numbers, by their powers of ten.
 #[derive(Clone, Copy, Debug)]
 struct Sizes {
     /// h_min or the stiffness, f_max, α, β, time, force, distance
@@ -481,7 +481,7 @@ fn sizes(reach: f64) -> impl Strategy<Value = Sizes> {
 }
 
 /// Finite and of length 1, turned in the plane of n and F, and no farther than α (|F| + f_max) t
-/// where a sigmoid expects f_max at the most.
+/// for a sigmoid with its largest force f_max.
 #[expect(clippy::too_many_lines)]
 fn check_extremes(
     sizes: &Sizes,
@@ -537,8 +537,8 @@ fn check_extremes(
                 .unwrap()
                 .step(&face, &p, &force, dt)
             else {
-                // a spring that is drawn away from its rest goes there as e^αkt: only that is
-                // beyond the largest number
+                // a stretched spring moves away from its rest as e^αkt: only that is beyond the
+                // largest number
                 let is_away = spring && alpha_m_per_n_s * h_min_m * dt > 300.0;
                 assert!(
                     is_away || may_overflow,
@@ -581,8 +581,8 @@ fn extremes_give_a_unit_normal_or_an_error() {
         |(sizes, directions, params)| check_extremes(&sizes, directions, params, false),
     );
     assert!(counts.values > 1500, "{counts:?}");
-    // as far as numbers go: a product of four sizes may be as far from 1 as 10^100, and what is
-    // refused is one of those
+    // the range of numbers: a product of four sizes may be as far from 1 as 10^100, and each
+    // refusal is one of those
     let counts = tried(
         "sizes of 1e-300 to 1e300",
         2048,
@@ -601,9 +601,9 @@ fn extremes_give_a_unit_normal_or_an_error() {
     assert!(counts.values > 200, "{counts:?}");
 }
 
-/// A face in a saturated model goes at one of two speeds, −c where nothing is expected (u > 0) and
-/// 1 − c where f_max is (u < 0), until it is at u = 0, or for ever: by as much as the bend is wide,
-/// |ln| of the smallest number of c and 1 − c, it is not there.
+/// A face in a saturated model moves at one of two speeds, −c at no expected force (u > 0) and 1 −
+/// c at f_max (u < 0), up to u = 0, or for ever. Its distance to u = 0 may deviate by the width of
+/// the bend, |ln| of the smaller of c and 1 − c.
 fn check_saturated(u: f64, c: f64, scaled: f64, rule: StepRule) -> Shown {
     let params = DynamicsParams {
         rule,
@@ -631,8 +631,7 @@ fn check_saturated(u: f64, c: f64, scaled: f64, rule: StepRule) -> Shown {
         }
     };
     let width = 40.0 + c.abs().min((1.0 - c).abs()).ln().abs();
-    // where it goes on, the bend also costs time: as much as it is wide at the slower of both
-    // speeds
+    // a face that goes on also loses time in the bend: its width at the slower of both speeds
     let delay =
         width * (1.0 + speed(-u).abs().max(speed(u).abs()) / speed(-u).abs().min(speed(u).abs()));
     let tolerance = delay + 1e-12 * (u.abs() + moved.abs());
@@ -700,7 +699,7 @@ fn check_sum(u: f64, c: f64, t: f64, first: f64, tilted: bool) -> Shown {
     let once = flow(&UP, u, 1.0, t);
     let half = flow(&UP, u, 1.0, first * t);
     let twice = flow(&half, u, 1.0, (1.0 - first) * t);
-    // what four roundings of u, F, t, and of u half-way, do to the result
+    // effect of four roundings of u, F, t, and of u half-way on the result
     let moved = [
         flow(&UP, u * ulps + 1e-15, 1.0, t).b - once.b,
         flow(&UP, u, ulps, t).b - once.b,
@@ -719,7 +718,7 @@ fn check_sum(u: f64, c: f64, t: f64, first: f64, tilted: bool) -> Shown {
         let half = 0.5 * u.clamp(-1400.0, 1400.0);
         c - (-half).exp() / (2.0 * half.cosh())
     };
-    // along a, which leans by 45° where it is tilted, and looks down where F does
+    // along a, which leans by 45° in the tilted case, and points down with F
     let up = once.b.z.signum() * once.b.coords.norm();
     let travel = if tilted { up * c.signum() } else { up };
     let ends = [rate(u) * t, rate(u - once.b.z) * t];
@@ -821,8 +820,8 @@ fn one_face_comes_to_the_true_plane_distance_first_then_normal() {
                 distance_s < 0.7 * normal_s,
                 "the distance is corrected first"
             );
-            // the surface is as soft as the model says, so nothing remains but what 40 s have not
-            // yet turned
+            // the surface is as soft as the model says, so nothing remains but the rest of the turn
+            // after 40 s
             assert!(distance < 1e-9 && normal < 1e-5);
         }
     }

@@ -1,7 +1,6 @@
 //! A property for each formula of the method, over the whole range of numbers: denormals, overflow
-//! and cancellation are included on purpose. What was the worst in long runs is a case of its own.
-//! Where a case can show little it is counted, and a predicate of the test decides what may be
-//! refused.
+//! and cancellation on purpose. The worst cases of long runs have tests of their own. [`Counts`]
+//! counts cases that show little, and a predicate of each test decides the permitted refusals.
 
 use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
 use proptest::prelude::*;
@@ -79,7 +78,7 @@ fn check_force(f_max: f64, h_min: f64, delta: f64, h: f64) -> Shown {
         force_by_cosh(f_max, u),
     );
     assert!((0.0..=f_max).contains(&force), "{force}");
-    // a few roundings, and what underflows
+    // a few roundings, and underflow
     let tolerance = 16.0 * EPSILON * expected + (1.0 + f_max) * 1e-307;
     assert!(
         u.is_infinite() || (force - expected).abs() <= tolerance,
@@ -93,7 +92,7 @@ fn check_force(f_max: f64, h_min: f64, delta: f64, h: f64) -> Shown {
     }
 }
 
-/// f(f⁻¹(F)) is F again, but for what a rounding of u = ln(f_max/F − 1) does to it.
+/// f(f⁻¹(F)) is F again, up to the effect of a rounding of u = ln(f_max/F − 1).
 fn check_inverse(f_max: f64, delta: f64, share: f64) -> Shown {
     let (model, force) = (sigmoid(f_max, 1.0, delta), f_max * share);
     if !(force > 0.0 && force < f_max) {
@@ -161,8 +160,8 @@ fn is_huge(factors: &[f64]) -> bool {
     factors.iter().map(|x| x.abs().log10()).sum::<f64>() > 307.0
 }
 
-/// A spring falls to e^−αkt of its distance to rest. It is refused only where a product is huge
-/// that its travel h + F/k, its impulse k ∫ h dt or their terms consist of.
+/// A spring falls to e^−αkt of its distance to rest. It refuses only a huge product in its travel h
+/// + F/k, its impulse k ∫ h dt or their terms.
 fn check_spring(stiffness: f64, alpha: f64, dt: f64, h: f64, force: f64) -> Shown {
     let model = ContactModel::Spring {
         stiffness_n_per_m: stiffness,
@@ -197,7 +196,7 @@ fn check_spring(stiffness: f64, alpha: f64, dt: f64, h: f64, force: f64) -> Show
     } else {
         left * -(-z).exp_m1()
     };
-    // both terms of the sum are rounded before they meet; what underflows in between is below the
+    // both terms of the sum have a rounding of their own; underflow in between is below the
     // smallest normal number
     let terms = (h.abs() + (force / stiffness).abs()) * z.min(1.0);
     let underflow = f64::MIN_POSITIVE * (1.0 + alpha * dt) * (1.0 + stiffness.recip().min(1e300));
@@ -206,8 +205,7 @@ fn check_spring(stiffness: f64, alpha: f64, dt: f64, h: f64, force: f64) -> Show
         .iter()
         .all(|x| x.is_finite())
         && z.is_normal();
-    // with few digits left in αk or αt there are no more in what comes of it: less than a rounding
-    // of h
+    // few digits in αk or αt leave few in the result: less than a rounding of h
     let is_meaningful =
         is_meaningful && (alpha * stiffness).is_normal() && (alpha * dt).is_normal();
     assert!(
@@ -227,7 +225,7 @@ fn check_spring(stiffness: f64, alpha: f64, dt: f64, h: f64, force: f64) -> Show
 /// ends and 1/4: so the travel lies between the last rate and the first times t, and between g (1 −
 /// e^−mT) and g (1 − e^−T/4).
 ///
-/// It is refused only where the scaled time α f_max t / h_min or the travel α F t is huge.
+/// It refuses only a huge scaled time α f_max t / h_min or a huge travel α F t.
 #[expect(clippy::too_many_lines)]
 fn check_position(h_min: f64, f_max: f64, alpha: f64, share: f64, u: f64, dt: f64) -> Shown {
     let model = sigmoid(f_max, h_min, 0.0);
@@ -235,7 +233,7 @@ fn check_position(h_min: f64, f_max: f64, alpha: f64, share: f64, u: f64, dt: f6
     if !(h.is_finite() && h_min.is_normal() && force > 0.0 && force < f_max) {
         return Shown::Little;
     }
-    // below the smallest normal number a force has few digits, and another share than was drawn
+    // below the smallest normal number a force has few digits, and another share than the drawn one
     let share = force / f_max;
     let Ok(after) = dynamics(model, alpha, 0.0).step(
         &UP,
@@ -277,7 +275,7 @@ fn check_position(h_min: f64, f_max: f64, alpha: f64, share: f64, u: f64, dt: f6
     let reach = alpha * f_max * dt;
     let scaled = reach / h_min;
     let lost = reach * EPSILON * (32.0 + u.abs() + at_rest.abs());
-    // where the rate underflows it bounds nothing
+    // an underflowing rate bounds nothing
     let is_meaningful = [alpha * f_max, rate(u), reach, scaled, lost]
         .iter()
         .all(|x| x.is_normal());
@@ -303,8 +301,8 @@ fn check_position(h_min: f64, f_max: f64, alpha: f64, share: f64, u: f64, dt: f6
     }
 }
 
-/// du/dT = 1/(1 + eᵘ) − c by the classical Runge–Kutta method in so many even steps that its error
-/// is 1e-8 at the most.
+/// du/dT = 1/(1 + eᵘ) − c by the classical Runge–Kutta method in even steps, with an error of at
+/// most 1e-8.
 fn flowed(u: f64, c: f64, scaled: f64) -> f64 {
     let (steps, rate) = (4000, |u: f64| force_by_cosh(1.0, u) - c);
     let step = scaled / f64::from(steps);
@@ -412,7 +410,7 @@ fn check_push(shake: &[f64], centre: &Vector3<f64>, force: &Vector3<f64>, depth:
         };
         let [a, b, c] = mesh.corners(mismatch.face).map(|v| before[v.0 as usize]);
         let n = (b - a).cross(&(c - a)).normalize();
-        // the corners relative to the first: nothing large is subtracted
+        // the corners relative to the first, without subtraction of large numbers
         let barycentre = (b - a + (c - a)) / 3.0;
         let h = (at - a - normal * 1.5e-3 - barycentre).dot(&n);
         let rounding = 64.0 * EPSILON * (centre.norm() + 1e-2);
@@ -493,7 +491,7 @@ fn check_push(shake: &[f64], centre: &Vector3<f64>, force: &Vector3<f64>, depth:
 
 const CASES: u32 = 4096;
 
-/// At least so many per cent of the cases determine a value.
+/// At least `percent` per cent of the cases determine a value.
 #[track_caller]
 fn assert_meaningful(counts: Counts, percent: u32) {
     let Counts {
@@ -858,8 +856,8 @@ fn an_underflowing_product_does_not_pass_for_no_time() {
     assert!((face.b.z - 1e-200).abs() < 1e-214, "{:e}", face.b.z);
 }
 
-/// At 1e299 scaled times overflowed from u = −700, and the face was 1e299 m away: that is refused
-/// now.
+/// At 1e299 scaled times overflowed from u = −700 and put the face 1e299 m away; now the step
+/// refuses them.
 #[test]
 fn the_worst_positions_of_eq_6() {
     for u in [-700.0, -40.0, -1e-16, 0.0, 1e-16, 36.7, 40.0, 700.0] {

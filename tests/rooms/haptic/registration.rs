@@ -1,5 +1,5 @@
-//! The offset between scan and part: recovered from contacts, refused where they do not determine
-//! it, and honest about noise.
+//! The offset between scan and part: recovered from contacts, refused if they do not determine it,
+//! and honest about noise.
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3, vector};
 use rand::SeedableRng;

@@ -18,7 +18,7 @@ fn volume(mesh: &TriMesh) -> f64 {
         .sum()
 }
 
-/// What a file gives.
+/// Result of reading a file.
 enum Gives {
     /// vertices, faces, boundary edges, boundary loops, non-manifold edges
     Mesh(MeshUnit, [usize; 5]),
@@ -315,7 +315,7 @@ fn ply_keeps_the_order_and_leaves_out_what_was_removed() {
 }
 
 /// By hand: 4 vertices of three doubles and one float each follow the header; the one without a
-/// face is left out.
+/// face drops out.
 #[test]
 fn columns_are_properties_of_the_vertices_in_ply() {
     let p = [[0.0, 0.0], [1.0, 0.0], [9.0, 9.0], [0.0, 1.0], [1.0, 1.0]]
@@ -448,7 +448,7 @@ fn colours_are_bytes_or_shares_and_all_vertices_have_one_or_none() {
     assert_eq!(read("some.obj", &obj("")), None);
     let expected = VertexColours::Rgb(vec![[255, 0, 0], [0, 255, 0], [0, 0, 255]]);
     assert_eq!(read("all.obj", &obj(" 0 0 1")), Some(expected));
-    // beyond what a colour can be
+    // beyond the range of a colour
     let beyond = of("float") + "0 0 0 -1 2 nan 1\n1 0 0 0 0 0 1\n0 1 0 0 0 0 1\n3 0 1 2\n";
     let expected = VertexColours::Rgba(vec![[0, 255, 0, 255], [0, 0, 0, 255], [0, 0, 0, 255]]);
     assert_eq!(read("beyond.ply", &beyond), Some(expected));
@@ -502,7 +502,7 @@ fn ply_variants_are_read() {
          8 0 1 3 2 -1 0 1 2\n"
     );
     let MeshFile { mesh, repair } = read_text("a.ply", strips.as_bytes()).unwrap();
-    // faces 013, 312 and 012, of which the last is inverted
+    // faces 013, 312 and 012, the last upside down
     assert_eq!(
         (
             mesh.face_count(),
@@ -621,8 +621,7 @@ fn prism(outline: &[[f64; 2]], height: f64, first: usize) -> [(&'static str, Str
     [("prism.obj", obj), ("prism.ply", ply), ("prism.stl", stl)]
 }
 
-/// An L, a comb, a spiral, and a frame whose opening is joined to its rim by a cut, each with its
-/// area.
+/// An L, a comb, a spiral, and a frame with a cut from its opening to its rim, each with its area.
 #[rustfmt::skip]
 const OUTLINES: [(&[[f64; 2]], f64); 4] = [
     (&[[0., 0.], [4., 0.], [4., 1.], [1., 1.], [1., 3.], [0., 3.]], 6.0),
@@ -786,7 +785,7 @@ proptest! {
         bytes.truncate((cut * bytes.len() as f64) as usize);
         if !bytes.is_empty() {
             for (at, bit) in flips {
-                // half of the damage goes into the first 400 bytes, where the headers are
+                // half of the damage hits the headers in the first 400 bytes
                 let len = if bit % 2 == 0 { bytes.len().min(400) } else { bytes.len() };
                 let at = at.index(len);
                 bytes[at] ^= 1 << bit;
@@ -794,8 +793,8 @@ proptest! {
         }
         std::fs::write(&path, &bytes).unwrap();
         let (outcome, largest) = largest_request(|| read_mesh(&path, Metre));
-        // 24 bytes of position for the 3 bytes of the shortest row, and what the tables need at
-        // least
+        // 24 bytes of position for the 3 bytes of the shortest row, and the smallest size of the
+        // tables
         prop_assert!(largest <= 16 * bytes.len() + 4096, "{largest} bytes at once");
         match outcome {
             Ok(MeshFile { mesh, .. }) => prop_assert!(mesh.face_count() > 0),

@@ -109,7 +109,7 @@ fn messages(bag: &Path) -> (Vec<StampedPose>, Vec<StampedWrench>) {
     (poses, wrenches)
 }
 
-/// Where the ball touched: p − r F/|F|. In this recording each wrench has the stamp of a pose.
+/// Touched places of the ball: p − r F/|F|. In this recording each wrench has the stamp of a pose.
 fn contact_points(bag: &Path) -> (Vec<Point3<f64>>, Vec<Vector3<f64>>) {
     let (poses, wrenches) = messages(bag);
     assert_eq!((poses.len(), wrenches.len()), (6_000, 6_000));
@@ -413,8 +413,8 @@ fn a_replay_equals_the_first_run_byte_for_byte() {
     let output = plate.refine("beside.ply", &["--live"]);
     assert_eq!((code(&output), stderr(&output)), (0, String::new()));
     let live = &summary(&output)["live"];
-    // 4.2 s in steps of 8 ms, and what is left at the end; those that come after a late one take
-    // more in and are fewer
+    // 4.2 s in steps of 8 ms, and the rest at the end; renewals after a late one take more in and
+    // are fewer
     let least = if number(live, "late") == 0 { 520 } else { 1 };
     assert!((least..=530).contains(&number(live, "renewals")), "{live}");
     let behind = &live["behind_ns"];
@@ -445,7 +445,7 @@ fn a_replay_equals_the_first_run_byte_for_byte() {
     );
 }
 
-/// A pose that is no rotation is a lost pose: no sample is lost for it, and the sum shows it.
+/// A pose without a rotation is a lost pose: no sample drops out for it, and the sum shows it.
 #[test]
 fn the_numbers_add_up_when_a_pose_is_bad() {
     let plate = Plate::new();
@@ -565,7 +565,8 @@ fn other_parameters_give_another_mesh() {
 // ---- damage
 // -----------------------------------------------------------------------------------------------------
 
-/// What any run may do: finish, with a whole mesh; or refuse with one line, and leave no file.
+/// Permitted outcomes of any run: finish, with a whole mesh; or refuse with one line, and leave no
+/// file.
 fn check_outcome(
     output: &Output,
     out: &Path,
@@ -715,7 +716,7 @@ fn nasty_scans_are_refused_in_one_line_or_refined() {
     for scan in &files {
         for unit in [MeshUnit::Millimetre, MeshUnit::Metre, MeshUnit::Inch] {
             let what = format!("{} in {unit}", scan.display());
-            // whatever is said of touches of another part
+            // `--force` overrides findings about touches of another part
             let flags = [
                 "--json",
                 "--force",

@@ -1,4 +1,4 @@
-//! Point clouds as scans: shapes that are known, with noise; real clouds.
+//! Point clouds as scans: known shapes, with noise; real clouds.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -87,7 +87,7 @@ fn a_noisy_ball_comes_out_closed_within_the_noise_in_any_unit() {
     }
 }
 
-/// Pieces of work in so many parts, the last first.
+/// Runs work in this number of parts, the last first.
 struct InParts(usize);
 
 impl Workers for InParts {
@@ -210,7 +210,7 @@ fn a_ply_without_faces_goes_by_its_normals_and_an_organised_pcd_by_its_scanner()
     );
 }
 
-/// Volume, by the divergence theorem, over that of the ball; positive where the faces look outside.
+/// Volume, by the divergence theorem, over that of the ball; positive for faces that look outside.
 fn share_of_ball(mesh: &TriMesh) -> f64 {
     let corner = |v| mesh.positions()[v] - Point3::new(1.0, 2.0, 3.0);
     let volume: f64 = mesh
@@ -221,8 +221,8 @@ fn share_of_ball(mesh: &TriMesh) -> f64 {
     volume / (4.0 / 3.0 * std::f64::consts::PI * 0.05f64.powi(3))
 }
 
-/// A file in which the scans of a whole part were merged names one place: in the middle of the
-/// part, on it, beside it, far away. Nothing sees all of the part from there.
+/// A file that merges scans of a whole part names one place: in the middle of the part, on it,
+/// beside it, far away. No place sees all of the part.
 #[test]
 fn a_place_that_is_no_scanners_turns_no_closed_part_inside_out() {
     let points = ball_points(3000);
@@ -246,7 +246,7 @@ fn a_place_that_is_no_scanners_turns_no_closed_part_inside_out() {
         let share = share_of_ball(&mesh);
         assert!((share - 1.0).abs() < 0.02, "{eye:?}: {share}");
     }
-    // its upper half alone is seen from above, and its inside from within
+    // of its upper half alone a viewpoint above sees the outside, one within the inside
     let upper: Vec<_> = points.into_iter().filter(|p| p.z > 3.01).collect();
     for (eye, sign) in [(9.0, 1.0), (3.0, -1.0)] {
         let text = format!(

@@ -1,4 +1,4 @@
-//! Clusters against parts whose creases can be counted by hand.
+//! Clusters against parts with creases that one can count by hand.
 
 use touchup::features::clusters::{Bend, ClusterParams, PaperParams, clusters, paper_clusters};
 use touchup::features::k_means;

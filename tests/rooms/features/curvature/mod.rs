@@ -1,5 +1,5 @@
-//! Curvature against Gauss and Bonnet and against surfaces whose curvature is known; clusters
-//! against the true features.
+//! Curvature against Gauss and Bonnet and against surfaces of known curvature; clusters against the
+//! true features.
 
 #[path = "clusters.rs"]
 mod clusters_of;
@@ -16,7 +16,7 @@ use touchup::mesh::TriMesh;
 
 const MM: f64 = 1e-3;
 
-/// Each vertex somewhere else by up to so much.
+/// Each vertex displaced at random by up to `by`.
 fn crumpled(mesh: &TriMesh, by: f64, seed: u64) -> TriMesh {
     let mut rng = Pcg64::seed_from_u64(seed);
     let moved = |p: &Point3<f64>| p + Vector3::from_fn(|_, _| within(&mut rng, -by, by));

@@ -127,7 +127,7 @@ fn a_tenth_of_the_faces_missing_takes_no_hole_and_gives_none() {
     }
 }
 
-/// The block with 30 % of its facets turned over: repaired while it is read.
+/// The block with 30 % of its facets turned over: the reader repairs it.
 #[test]
 fn turned_facets_are_turned_back() {
     let (Some(path), Some(mesh)) = (
@@ -141,7 +141,7 @@ fn turned_facets_are_turned_back() {
     assert!(are_alike(&found(&flipped.mesh), &found(&mesh), 1e-7));
 }
 
-/// Whatever of the bad files can be read gives features, or none.
+/// Each readable bad file gives features, or none.
 #[test]
 fn bad_files_give_something_or_nothing() {
     let Some(folder) = shared("nasty") else {

@@ -1,10 +1,10 @@
 //! Round holes of CAD meshes, counted and measured by other means.
 //!
-//! Each part was rendered from six sides by casting rays (Open3D) and its holes were counted in the
+//! Ray casting (Open3D) rendered each part from six sides, and a person counted its holes in the
 //! pictures. Sizes come from a program of its own (trimesh, numpy): the mesh parted at edges
-//! sharper than 30° (35° where circles have twelve sides), a circle of least squares through the
-//! corners that bound each round patch, heights of those corners. Of closed parts the genus is the
-//! number of through-openings; it was computed too and agrees.
+//! sharper than 30° (35° for circles of twelve sides), a circle of least squares through the
+//! corners that bound each round patch, heights of those corners. The genus of a closed part is its
+//! number of through-openings; its computed value agrees.
 
 use touchup::features::FeatureKind;
 use touchup::io::mesh_file::MeshUnit::{Inch, Metre, Millimetre};
@@ -111,9 +111,9 @@ fn plate_holes_has_four_countersunk_holes_and_a_counterbored_one() {
 
 /// From above one large bore, in the front face two small holes. Genus 3. The bore has 50 corners
 /// on r 22.225 and 49 more on the chords between them, so that a circle through all is 0.03 mm too
-/// small; both its edges are broken by 0.79 mm at 45°, which is no countersink. The small holes run
-/// out of the front wall (5.08 mm thick) into the top of the plate: they go through, their walls
-/// end aslant.
+/// small; chamfers of 0.79 mm at 45° break both its edges, which is no countersink. The small holes
+/// run out of the front wall (5.08 mm thick) into the top of the plate: they go through, their
+/// walls end aslant.
 #[test]
 fn idler_riser_has_a_bore_and_two_screw_holes() {
     let Some(mesh) = part("trimesh_idler_riser.STL", Inch) else {
@@ -142,9 +142,9 @@ fn idler_riser_has_a_bore_and_two_screw_holes() {
 }
 
 /// The slanted plate shows six holes, four with light through them; the front face three, one with
-/// light at its end (the picture from behind). Genus 5. The blind ones have tips of 118°, which
-/// their depth leaves out: walls of 6.0 and 19.05 mm. The one with light leaves through a face at
-/// 45°: no depth is stated.
+/// light at its end (the picture from behind). Genus 5. The blind ones have tips of 118°, outside
+/// their depth: walls of 6.0 and 19.05 mm. The one with light leaves through a face at 45° and has
+/// no stated depth.
 #[test]
 fn ee2_has_five_through_and_four_blind_holes() {
     let Some(mesh) = part("crs_ee2.stl", Metre) else {

@@ -1,4 +1,4 @@
-//! Meshes without the features that might be taken for some.
+//! Meshes without the features that they resemble.
 
 use nalgebra::{Point3, Vector3};
 use rand_distr::{Distribution, StandardNormal};

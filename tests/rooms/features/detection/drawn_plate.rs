@@ -1,5 +1,5 @@
-//! The simulated plate as its drawing has it, its arcs divided coarsely and finely, and a hole of
-//! which the edge is broken. Sizes and places are those they are made from.
+//! The simulated plate as its drawing has it, its arcs divided coarsely and finely, and a hole with
+//! a broken edge. Sizes and places are those of the construction.
 
 use nalgebra::Point3;
 use touchup::features::{Feature, FeatureKind};
@@ -42,7 +42,7 @@ fn everything_on_the_plate_is_found_however_finely_it_is_divided() {
         assert_eq!(counts, [2, 1, 0, 1], "chord {chord}");
         for truth in Plate::default().features() {
             let (kind, expected) = match truth.shape {
-                // a plain through-hole may be described from either end
+                // either end describes a plain through-hole
                 TruthShape::Hole { through: true, .. } | TruthShape::Step { .. } => continue,
                 TruthShape::Hole {
                     diameter, depth, ..
@@ -71,8 +71,8 @@ fn everything_on_the_plate_is_found_however_finely_it_is_divided() {
     }
 }
 
-/// An edge is broken by another shape than a countersink: the hole begins at the plane all the
-/// same, and not where its wall does.
+/// Another shape than a countersink breaks an edge: the hole begins at the plane all the same, and
+/// not at the start of its wall.
 #[test]
 fn a_hole_with_a_broken_edge_is_as_deep_as_from_its_plane() {
     // with a flat floor, and with the tip of a drill of 118°

@@ -1,4 +1,4 @@
-//! Holes that are expected, and how they are compared with those found.
+//! Expected holes, and their comparison with detected ones.
 
 use nalgebra::{Point3, Vector3};
 use touchup::features::{Feature, FeatureKind, FittedTo};
@@ -16,11 +16,11 @@ pub struct Round {
     /// out of it, any length
     pub out: [f64; 3],
     pub through: bool,
-    /// of the round wall; `None` where it ends aslant
+    /// of the round wall; `None` if it ends aslant
     pub depth: Option<f64>,
     /// of the countersink
     pub cone: Option<f64>,
-    /// whether it may be described from its other end
+    /// whether its other end describes it as well
     pub either_end: bool,
 }
 
@@ -59,11 +59,11 @@ pub fn blind(diameter: f64, at: [f64; 3], out: [f64; 3], depth: f64) -> Round {
     }
 }
 
-/// The tables give thousandths of a millimetre; corners of the files are rounded to less.
+/// The tables give thousandths of a millimetre; the rounding of corners in the files is smaller.
 const PLACE: f64 = 3e-3 * MM;
 /// Required tolerance of diameters, as a share.
 const DIAMETER: f64 = 0.005;
-/// Where all corners of an exact mesh lie on the circle there is nothing else than rounding.
+/// If all corners of an exact mesh lie on the circle, rounding alone remains.
 const EXACT_DIAMETER: f64 = 1e-3 * MM;
 
 impl Round {

@@ -1,5 +1,4 @@
-//! What detection must not depend on: where the part lies, how it is turned, and in which unit it
-//! was drawn.
+//! Detection does not depend on the pose of the part, nor on the unit of its drawing.
 
 use std::collections::BTreeMap;
 
@@ -45,7 +44,7 @@ fn is_image(
         .into_iter()
         .zip(number(other))
         .all(|(a, b)| (a * scale - b).abs() < limit);
-    // a plain through-hole may be described from its other end
+    // its other end describes a plain through-hole as well
     let direction = one
         .axis
         .as_ref()
@@ -81,7 +80,7 @@ fn check(
     let (before, after) = (holes_slots_pockets(&here), holes_slots_pockets(&there));
     prop_assert_eq!(before.len(), after.len(), "{}", name);
     let [lo, hi] = mesh.bounds();
-    // files are rounded to a millionth of the part: fits that end a step earlier or later differ by
+    // the files round to a millionth of the part: fits that end a step earlier or later differ by
     // less
     let limit = 2e-6 * scale * (hi - lo).norm();
     for one in before {

@@ -1,4 +1,4 @@
-//! What must hold whatever the numbers: units, frames, ball centres.
+//! Laws for all numbers: units, frames, ball centres.
 
 use nalgebra::{UnitQuaternion, Vector3};
 use proptest::prelude::*;
@@ -99,8 +99,8 @@ fn ball_centres_give_what_the_touched_points_give() {
     }
 }
 
-/// A number that is twice the radius is known half as well; one of two freedoms, as their
-/// covariance has it.
+/// The uncertainty of twice the radius is twice as large; that of a sum of two freedoms follows
+/// from their covariance.
 #[test]
 fn an_estimate_has_the_uncertainty_of_what_it_is_made_of() {
     let fit = fit(
@@ -152,9 +152,8 @@ fn fit_follows(motion: &Isometry3<f64>, seed: u64) {
     assert_eq!(there.used, here.used);
 }
 
-/// Its axis leans by so much from the one known before that a gradient of small leans, which is not
-/// that of the cost, stops the solver beside the least cost: 1.03e-7 rad from where it stops in
-/// another frame.
+/// The axis leans from the prior one, and the solver uses a gradient for small leans, which is not
+/// that of the cost: it stops beside the least cost, 1.03e-7 rad from its result in another frame.
 #[test]
 fn a_turn_about_the_axis_moves_a_fit_that_is_hardly_known() {
     let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), -0.8008609993554514);

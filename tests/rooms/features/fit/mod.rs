@@ -1,5 +1,4 @@
-//! Fits of surfaces against surfaces that are known: bias, stated uncertainty, outliers, few and
-//! lopsided points.
+//! Fits against known surfaces: bias, stated uncertainty, outliers, few and lopsided points.
 
 mod laws;
 mod monte_carlo;

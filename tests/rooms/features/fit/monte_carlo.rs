@@ -28,7 +28,7 @@ fn normalised(fit: &Fit<Cylinder>, r: f64) -> Vec<f64> {
     let f = &fit.surface;
     let axis = f.pose_of.inverse_transform_vector(&Vector3::z());
     let axis = axis * axis.z.signum();
-    // the true axis where it passes the plane z = 0 of the fitted frame
+    // point of the true axis in the plane z = 0 of the fitted frame
     let o = f.pose_of.inverse_transform_point(&Point3::origin()).coords;
     let o = o - axis * (o.z / axis.z);
     let errors = [
@@ -147,8 +147,8 @@ fn stated_uncertainty_holds_for_errors_shared_in_passes() {
             })
             .collect();
         println!("{name}: {:.3}", rms(&z));
-        // errors that are the contacts' own, and only said to be shared, leave the fit better than
-        // it says: by √20
+        // independent errors of contacts, stated as shared, leave the fit better than it says: by
+        // √20
         let range = if shared > 0.0 { 0.5..2.0 } else { 0.15..1.0 };
         assert!(range.contains(&rms(&z)), "{name}: {}", rms(&z));
     }
@@ -208,7 +208,7 @@ fn planes_and_cones_are_right_in_the_mean_and_say_how_well() {
         let cone = fit(&guess, &touched, &FitParams::default()).unwrap();
         angles.push(cone.surface.half_angle - half_angle);
         of_cone.push((cone.surface.half_angle - half_angle) / cone.std(Freedom::Second).unwrap());
-        // its diameter where its axis passes z = 0 of the true one
+        // its diameter at the crossing of its axis with z = 0 of the true one
         let height = -cone.surface.center().z / cone.surface.axis().z;
         let cos = cone.surface.half_angle.cos();
         let by = [
@@ -284,7 +284,7 @@ fn a_common_displacement_goes_into_the_place_whatever_arc_was_felt() {
     }
 }
 
-/// What two planes share is in the place of each and not in what they differ by.
+/// A displacement common to two planes is in the place of each and not in their difference.
 #[test]
 fn a_common_displacement_of_a_plane_is_beside_its_own_uncertainty() {
     let mut rng = generator(13);

@@ -108,7 +108,7 @@ fn what_the_touches_do_not_fix_is_named() {
         refusal(&near, &strip),
         FitError::Undetermined { .. }
     ));
-    // one circle: round it is, but its lean is undetermined
+    // one circle: round, but with an undetermined lean
     let circle: Vec<_> = hole()
         .iter()
         .map(|o| Observation {

@@ -36,8 +36,8 @@ fn pierces(p: &Point3<f64>, q: &Point3<f64>, [a, b, c]: &Triangle) -> bool {
     around.iter().all(|&x| x > 0.0) || around.iter().all(|&x| x < 0.0)
 }
 
-/// All pairs of faces that go through each other, by brute force; faces may share a corner, or an
-/// edge that is folded flat.
+/// All pairs of intersecting faces, by brute force; faces may share a corner, or an edge that folds
+/// flat.
 fn intersections(mesh: &TriMesh) -> Vec<(FaceId, FaceId)> {
     let faces: Vec<_> = mesh.faces().collect();
     let triangles: Vec<Triangle> = faces.iter().map(|&(face, _)| mesh.triangle(face)).collect();

@@ -1,4 +1,4 @@
-//! Numbers at the ends of what floats can say: whatever they are, every vertex stays at a place.
+//! Numbers at the ends of the range of floats: every vertex keeps finite coordinates.
 
 use super::*;
 use touchup::haptic::GuardParams;
@@ -157,7 +157,7 @@ fn a_ball_a_hair_off_a_face_carves_it_as_one_right_on_it() {
             .iter()
             .map(|p| p.z)
             .fold(0.0, f64::max);
-        // a face is carved along its normal, into the part
+        // carving moves a face along its normal, into the part
         assert!(
             lowest < -1e-6 && lowest.abs() < 2.0 * RADIUS && highest <= 1e-12,
             "{off:e}: {lowest:e} to {highest:e}"

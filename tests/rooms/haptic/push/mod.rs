@@ -1,4 +1,4 @@
-//! The refiner from outside: what a push may do, what it must do, and what it must never do.
+//! The refiner from outside: the permitted, required and forbidden effects of a push.
 
 mod adversary;
 mod extreme;
@@ -224,10 +224,9 @@ fn depth(mesh: &Refiner, centre: &Point3<f64>) -> f64 {
 }
 
 /// A ball without a force sinks through a thin lid, down to 4 mm, and stays there: the remaining
-/// depth is the tolerance, and what goes with the exponential after a second. While moving at v =
-/// 20 mm/s, the depth is where carving by 300 per second keeps up, tolerance + v/300 = 0.12 mm, for
-/// a face that lies square to it; for one that yields at a slant the path is up to three times as
-/// long.
+/// depth is the tolerance plus the exponential's rest after a second. While moving at v = 20 mm/s,
+/// carving by 300 per second keeps up at the depth tolerance + v/300 = 0.12 mm, for a face square
+/// to the motion; for one that yields at a slant the path is up to three times as long.
 #[test]
 fn nothing_of_a_lid_stays_inside_the_ball_deeper_than_the_tolerance() {
     let CarveParams {
@@ -282,7 +281,7 @@ fn all_faces_inside_the_tip_move_at_once() {
             ..RefineParams::robust(BALL)
         };
         let mut refiner = Refiner::new(mesh.clone(), params).unwrap();
-        // the tip is 0.5 mm deep in the lid, after it was known to be free
+        // the tip is 0.5 mm deep in the lid, after a stretch in free air
         let centre = Point3::new(0.3e-3, 0.2e-3, -0.5e-3 - lowest);
         (0..100).for_each(|tick| {
             refiner
@@ -308,7 +307,7 @@ fn all_faces_inside_the_tip_move_at_once() {
     }
 }
 
-/// The lid has gone down; the ball goes up again: unswept parts stay where they are.
+/// The lid has gone down; the ball goes up again: unswept parts keep their place.
 #[test]
 fn a_ball_that_leaves_takes_nothing_with_it() {
     let mut refiner = Refiner::new(grid(15, EDGE, |_, _| 0.0), RefineParams::robust(BALL)).unwrap();

@@ -118,8 +118,8 @@ fn beyond_f_max_the_printed_rule_runs_away_and_is_counted() {
     assert_eq!(refiner.counts().clamped, 2_001);
 }
 
-/// Fig 5: what is felt is more than f(0), what is expected is more than f(0) where the tip is in
-/// the face. F* and both mismatches are those of Eq 2, 4 and 5 in each case.
+/// Fig 5: the measured force is above f(0), the expected one is above f(0) for a tip in the face.
+/// F* and both mismatches are those of Eq 2, 4 and 5 in each case.
 #[test]
 fn all_four_cases_have_an_expected_force_and_both_mismatches() {
     let at_face = F_MAX / (1.0 + DELTA.exp());

@@ -20,9 +20,9 @@ fn mean_error(mesh: &TriMesh) -> f64 {
     sum / count
 }
 
-/// Each face is pressed for 0.1 s in each of several passes: at a rate of 25 per second more than
-/// e⁻² of the noise goes in one, and what its neighbours undo goes with the next. A twentieth of
-/// the noise is what three passes leave.
+/// The ball presses each face for 0.1 s in each of several passes: at a rate of 25 per second more
+/// than e⁻² of the noise goes in one, and the next removes the effect of its neighbours. Three
+/// passes leave a twentieth of the noise.
 #[test]
 fn a_noisy_plate_ends_on_the_true_plane_with_and_without_friction() {
     for (mu, tip) in [
@@ -77,8 +77,7 @@ fn a_noisy_stylus_leaves_less_than_a_third_of_its_noise() {
     }
 }
 
-/// Lowest, mean and highest vertex of a true plate after it was touched with 1 to 4 N in waves of 6
-/// mm, m.
+/// Lowest, mean and highest vertex of a true plate after touches with 1 to 4 N in waves of 6 mm, m.
 fn after_waves(tip: TipParams, params: RefineParams) -> [f64; 3] {
     let force = |travel: f64| 2.5 + 1.5 * (travel / 6e-3 * std::f64::consts::TAU).sin();
     let mut refiner = Refiner::new(grid(15, EDGE, |_, _| 0.0), params).unwrap();
@@ -114,16 +113,16 @@ fn a_varying_force_draws_no_ripples_but_does_in_paper_mode() {
         },
     ] {
         let [lo, _, hi] = after_waves(tip, RefineParams::robust(tip));
-        // friction is reported in steps of a thousandth: half of one is 1.2 µm at the corner of a
-        // face
+        // the estimate of friction has steps of a thousandth: half of one is 1.2 µm at the corner
+        // of a face
         assert!(
             lo.abs() < 1.2e-6 && hi.abs() < 1.2e-6,
             "the plate is true and stays so: {lo:e} {hi:e} m"
         );
     }
     let [lo, mean, hi] = after_waves(point, RefineParams::paper(point));
-    // a face floats by 1.40 mm where 1 N was measured last and by 2.30 mm where it was 4 N; then
-    // lower neighbours are nearer
+    // a face floats by 1.40 mm after a last force of 1 N and by 2.30 mm after 4 N; then lower
+    // neighbours are nearer
     assert!(mean > 0.7e-3 && mean < 2.3e-3, "the bias: {mean:e} m");
     assert!(
         hi - lo > 0.45e-3,
@@ -136,16 +135,16 @@ fn a_varying_force_draws_no_ripples_but_does_in_paper_mode() {
 #[test]
 fn a_varying_force_on_a_compliant_tip_draws_no_ripples() {
     let [lo, _, hi] = after_waves(BALL, RefineParams::robust(BALL));
-    // force and position are smoothed alike, so that nothing of the 0.15 mm by which the tip
-    // deflects should be left; half a step of friction as above
+    // force and position pass the same smoothing, so that nothing of the 0.15 mm deflection of the
+    // tip should remain; half a step of friction as above
     assert!(
         lo.abs() < 1.2e-6 && hi.abs() < 1.2e-6,
         "the plate is true and stays so: {lo:e} {hi:e} m"
     );
 }
 
-/// Beyond f_max there is no equilibrium: the force is clamped and counted, and the plate stays at
-/// the tip.
+/// Beyond f_max there is no equilibrium: the refiner clamps and counts the force, and the plate
+/// stays at the tip.
 #[test]
 fn force_beyond_the_model_does_not_run_away() {
     let tip = TipParams {
@@ -214,7 +213,7 @@ fn a_face_turned_away_from_the_measured_normal_never_blows_up() {
     }
 }
 
-/// The same within a mesh: every tenth face of a plate is inverted or on edge.
+/// The same within a mesh: every tenth face of a plate is upside down or on edge.
 #[test]
 #[ignore = "a slow proof"]
 fn turned_faces_in_a_plate_stay_within_bounds() {

@@ -1,4 +1,4 @@
-//! Samples and settings that are refused.
+//! Refused samples and settings.
 
 use super::*;
 use touchup::haptic::{DynamicsError, GuardParams, RefineError, RoiSize, SlidingParams, StepRule};

@@ -14,7 +14,7 @@ fn neighbours(mesh: &TriMesh, vertex: VertexId) -> BTreeSet<VertexId> {
     around.filter(|&other| other != vertex).collect()
 }
 
-/// What may move with a handle: its corners, and those near it or next to it.
+/// Vertices that may move with a handle: its corners, and those near it or next to it.
 fn region(mesh: &TriMesh, handle: FaceId, size: RoiSize) -> BTreeSet<VertexId> {
     let corners = mesh.corners(handle);
     let mut region = BTreeSet::from(corners);
@@ -61,7 +61,7 @@ fn vertices_outside_the_region_are_bit_equal_after_every_push() {
                 let face = update.mismatch.map(|mismatch| mismatch.face);
                 if update.fit.is_some() && face != handle {
                     handle = face;
-                    // the region is that of the moment when its handle was taken up
+                    // the region dates from the take-up of its handle
                     allowed = region(&before, face.unwrap(), size);
                 }
                 let (was, is) = (bits(&before), bits(refiner.mesh()));
@@ -110,8 +110,8 @@ fn carving_moves_the_corners_of_one_face() {
         assert!(is_one_face, "{moved:?}");
         if !moved.is_empty() {
             assert_eq!(update.case, Case::MeshOnly);
-            // what the spring of 20 N/mm lets expect at the plane of the face that the tip is in,
-            // and nothing is felt
+            // the force that the spring of 20 N/mm lets expect at the plane of the face around the
+            // tip, with no measured force
             let mismatch = update.mismatch.unwrap();
             let [a, b, c] = before.triangle(mismatch.face);
             let n = (b - a).cross(&(c - a)).normalize();
@@ -132,7 +132,8 @@ fn carving_moves_the_corners_of_one_face() {
     assert!(carved > 50, "{carved}");
 }
 
-/// Weights are solved to 1e-9 of their start; the mean over up to a dozen neighbours of twice that.
+/// The solver determines weights to 1e-9 of their start; the mean over up to a dozen neighbours to
+/// twice that.
 const MEAN_TOL: f64 = 1e-7;
 
 /// One push from rest; gives the displacement of each vertex and the handle.
@@ -207,7 +208,7 @@ fn a_free_vertex_moves_by_the_mean_displacement_of_its_neighbours() {
     }
 }
 
-/// … also where the region ends at the border of the scan.
+/// Here the region ends at the border of the scan.
 #[test]
 fn a_free_vertex_at_a_border_moves_by_the_mean_displacement_of_its_neighbours() {
     let half = 7.5 * EDGE;

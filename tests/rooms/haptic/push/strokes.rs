@@ -1,4 +1,4 @@
-//! Strokes of the haptic update alone are undone and redone bit for bit.
+//! Undo and redo of strokes of the haptic update alone, bit for bit.
 
 use super::*;
 use touchup::mesh::FaceTree;
@@ -58,7 +58,7 @@ fn strokes_are_undone_and_redone_bit_for_bit_and_the_index_follows() {
         assert!(refiner.redo());
         check(&refiner, expected);
     }
-    // a new stroke ends what could be redone
+    // a new stroke discards the redoable ones
     let mut last = strokes().pop().unwrap();
     last.iter_mut()
         .for_each(|sample| sample.stamp_ns += 10_000_000_000);

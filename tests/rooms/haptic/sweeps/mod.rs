@@ -1,5 +1,5 @@
-//! The paper's sweep experiment (Sec 4.3, Fig 11) on `peaks`, and the robust mode where the paper's
-//! rule gives up.
+//! The paper's sweep experiment (Sec 4.3, Fig 11) on `peaks`, and the robust mode on the cases in
+//! which the paper's rule gives up.
 //!
 //! `--run-ignored only` of nextest runs them; `--no-capture` shows the numbers.
 
@@ -55,7 +55,7 @@ struct Pass {
     off: f64,
 }
 
-/// One sweep of [`PaperSweeps`] written out, with what it did to each face.
+/// One sweep of [`PaperSweeps`] step by step, with its effect on each face.
 fn passes(refiner: &mut Refiner, truth: &TriMesh, stamp_ns: &mut i64) -> Vec<Pass> {
     let (model, stylus) = (
         RefineParams::paper(POINT).dynamics.model,
@@ -183,7 +183,8 @@ fn the_published_rule_converges_where_no_face_leans_out_of_its_basin_and_only_th
         converged.len() >= 2 && blown_up >= 2 && inside > 200,
         "{converged:?}"
     );
-    // the scan whose start is the 2.4 mm of the paper, and what its second implementation came to
+    // the scan with the paper's start of 2.4 mm, and the result of the paper's second
+    // implementation
     let paper = converged
         .iter()
         .find(|(_, mm)| (mm[0] - 2.4).abs() < 0.1)
@@ -200,7 +201,7 @@ fn the_published_rule_converges_where_no_face_leans_out_of_its_basin_and_only_th
 fn the_guard_lets_the_published_rule_starve_no_face() {
     for (edge, count) in [(10e-3, 10), (5e-3, 3)] {
         for seed in 1..=5 {
-            // without one nothing is asserted: its numbers are for reading
+            // without a guard the test asserts nothing: its numbers are for reading
             for guard in [Some(GuardParams::default()), None] {
                 let name = if guard.is_none() { "off" } else { "on" };
                 println!(
@@ -280,8 +281,8 @@ fn check_robust(peaks: &Peaks, samples: &[Sample], seed: u64, sweeps: usize) {
             now.row()
         );
         assert!(now.distance_mm <= start.distance_mm && now.normal_deg <= start.normal_deg);
-        // flipped faces are printed: a scan this noisy brings some 40 of 200, and one more is no
-        // blow-up
+        // a scan this noisy brings some 40 flipped faces of 200 without a blow-up: the test prints
+        // them
         assert!(now.farthest_mm <= start.farthest_mm + STRAY_MM);
         assert_no_face_starved(&before, run.refiner.mesh());
     }

@@ -82,7 +82,7 @@ fn every_bit_flip_of_an_mcap_is_found_or_harmless() {
     let mut random = Pcg64::seed_from_u64(7);
     for flip in 0..400 {
         let mut bytes = bytes.clone();
-        // half of them where the structure is
+        // half of them hit the structure
         let range = if flip % 2 == 0 { bytes.len() } else { 200 };
         let at = random.next_u64() as usize % range;
         bytes[at] ^= 1 << (random.next_u64() % 8);
@@ -172,7 +172,7 @@ fn records_that_overrun_an_unchecked_chunk_are_refused() {
     for (field, width) in [(name - 4 - 2 - 8, 8), (name - 4, 4)] {
         let mut bytes = bytes.clone();
         bytes[field..field + width].copy_from_slice(&0xffff_fff0_u64.to_le_bytes()[..width]);
-        // without the index the chunk itself must be searched
+        // without the index the reader must search the chunk itself
         bytes.truncate(bytes.len() - 1);
         let outcome = read_metered(&put(folder.path(), "overrun.mcap", &bytes));
         assert!(

@@ -1,4 +1,4 @@
-//! Recordings that are short, and say that what is in them is long.
+//! Short recordings that claim long contents.
 
 use std::path::Path;
 
@@ -89,7 +89,7 @@ fn the_names_of_all_topics_together_are_bounded() {
     );
 }
 
-/// Virtual tables run code of their own on what the file says.
+/// Virtual tables run code of their own on the file's text.
 #[test]
 fn a_virtual_table_is_no_table_of_messages() {
     let folder = tempfile::tempdir().unwrap();

@@ -97,7 +97,7 @@ pub fn db3_of(path: &Path, mcap: &[u8], payload: impl Fn(&[u8]) -> Vec<u8>) {
     db.execute_batch("COMMIT").unwrap();
 }
 
-/// Everything that can be read, and the error that ended it.
+/// Everything that the reader returned, and the error at its end.
 pub struct Outcome {
     pub messages: Vec<Message>,
     pub error: Option<RecordingError>,

@@ -1,7 +1,7 @@
 //! Recordings from outside: real ones, damaged ones, our own.
 //!
-//! Numbers of real recordings were taken with the Python package `rosbags` 0.11.9 (AnyReader,
-//! `math.fsum` of each field), which shares no code with this crate.
+//! Numbers of real recordings come from the Python package `rosbags` 0.11.9 (AnyReader, `math.fsum`
+//! of each field), which shares no code with this crate.
 
 use std::fs;
 use std::io::Cursor;
@@ -420,7 +420,7 @@ fn a_folder_is_read_in_the_order_of_its_metadata() {
         RecordingReader::open(folder.path(), &Topics::default()),
         Err(RecordingError::Metadata { .. })
     ));
-    // a recorder that was killed leaves none: then the order is that of the names
+    // a killed recorder leaves none: then the names give the order
     fs::remove_file(folder.path().join("metadata.yaml")).unwrap();
     fs::rename(folder.path().join("a.mcap"), folder.path().join("c.mcap")).unwrap();
     let reader = RecordingReader::open(folder.path(), &Topics::default()).unwrap();
@@ -432,8 +432,7 @@ fn a_folder_is_read_in_the_order_of_its_metadata() {
     for name in ["b.mcap", "c.mcap"] {
         fs::remove_file(folder.path().join(name)).unwrap();
     }
-    // of a session that was ended before the first message nothing is left, or a file that has not
-    // begun
+    // a session that ends before the first message leaves nothing, or a file without a start
     for begun in [None, Some("0.mcap")] {
         begun.map(|name| put(folder.path(), name, b"\x89MCAP0\r\n"));
         let empty = RecordingReader::open(folder.path(), &Topics::default())
@@ -519,7 +518,7 @@ fn other_files_are_named_for_what_they_are() {
     ));
 }
 
-/// Headers without a stamp: by the time of the log the messages are those that were stamped.
+/// Headers without a stamp: with the log times the messages equal those with stamps.
 #[test]
 fn by_the_log_messages_without_a_stamp_have_one() {
     let folder = tempfile::tempdir().unwrap();

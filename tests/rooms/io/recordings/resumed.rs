@@ -1,4 +1,4 @@
-//! A recording that was cut off, as by a crash, and goes on.
+//! A recording that breaks off, as by a crash, and goes on.
 
 use std::fs;
 
@@ -19,8 +19,8 @@ fn write(writer: &mut SegmentedWriter, messages: &[Message]) {
     }
 }
 
-/// Wherever it is cut, all that was flushed before is there, and what comes then follows it; the
-/// result has its end.
+/// After a cut at any place everything flushed is there, and new messages follow it; the result has
+/// its end.
 #[test]
 fn a_recording_that_was_cut_goes_on_behind_what_was_flushed() {
     let folder = tempfile::tempdir().unwrap();
@@ -48,7 +48,7 @@ fn a_recording_that_was_cut_goes_on_behind_what_was_flushed() {
             there.push(*message)
         })
         .unwrap();
-        // at least what was flushed; of the rest all that can still be read
+        // at least the flushed messages; of the rest all that is still readable
         let flushed = 20 * lengths.iter().filter(|length| **length <= cut).count();
         assert!(
             there.len() >= flushed && there.len() <= 40,
@@ -72,8 +72,8 @@ fn a_recording_that_was_cut_goes_on_behind_what_was_flushed() {
     }
 }
 
-/// A file that could not be begun, as on a full disk, takes none of those before it along: what
-/// comes when there is room goes behind them.
+/// A file that failed to begin, as on a full disk, takes none before it along: messages that find
+/// room later go behind them.
 #[test]
 fn a_file_that_could_not_be_begun_takes_no_other_along() {
     let folder = tempfile::tempdir().unwrap();
