@@ -1,5 +1,5 @@
-//! A touch too light for a contact says neither where the surface is nor where none is: the scan
-//! stays as it was.
+//! A touch too light for a contact gives neither a surface nor free space: the scan keeps its
+//! shape.
 
 use std::fs;
 

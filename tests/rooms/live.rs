@@ -16,7 +16,7 @@ use crate::full::either;
 use crate::plate_stream::{PlateStream, contacts_of, plate_stream};
 use crate::soundness::{intersections, rim_length, soundness};
 
-/// Parts of the patch that are taken up at one sample.
+/// Parts of the patch that the mesh takes up at one sample.
 const AT_ONCE: usize = 80;
 /// The same on every machine.
 const PATIENT: Pace = Pace {
@@ -96,7 +96,7 @@ fn contacts(stream: &PlateStream) -> Vec<ContactSample> {
     contacts_of(radius, Some(stiffness), &stream.samples)
 }
 
-/// Calls `each` with the change of each renewal, and at the end once more for what is left.
+/// Calls `each` with the change of each renewal, and at the end once more for the rest.
 fn renew(
     stream: &PlateStream,
     patcher: &mut Patcher,
@@ -186,7 +186,7 @@ fn renewed_bit_by_bit_it_is_the_skin_of_all_at_once_and_sound_all_along() {
             at(0.95),
             at(0.99)
         );
-        // what was taken in only nearby differs: 0.0004, 0.006 and 0.09 mm
+        // nearby touches of later samples make a difference: 0.0004, 0.006 and 0.09 mm
         assert!(
             at(0.5) < 0.0006 && at(0.95) < 0.008 && at(0.99) < 0.1,
             "{summary}"
@@ -202,7 +202,7 @@ fn renewed_bit_by_bit_it_is_the_skin_of_all_at_once_and_sound_all_along() {
             .map(|tree| tree.closest(&mesh, &x, 1.0).unwrap().distance_squared);
         assert_eq!(a, b);
     }
-    // and what no touch came near stayed
+    // and faces without a touch nearby keep their corners
     for (face, corners) in scan
         .faces()
         .filter(|(face, _)| whole.has_face(*face) && whole.corners(*face) == scan.corners(*face))
@@ -211,8 +211,8 @@ fn renewed_bit_by_bit_it_is_the_skin_of_all_at_once_and_sound_all_along() {
     }
 }
 
-/// In a pause faces are merged where the surface is plain; where touches come after it, those of
-/// the lattice come again. No crack is between, and at rest it is what is saved.
+/// A pause merges faces of plain surface; touches after it bring those of the lattice back. No
+/// crack is between, and at rest the mesh equals the saved one.
 #[test]
 #[ignore = "a slow proof"]
 fn after_a_pause_touches_go_on_beside_merged_faces_without_a_crack() {
@@ -262,7 +262,7 @@ fn after_a_pause_touches_go_on_beside_merged_faces_without_a_crack() {
         let saved = all.patched(scan, &tree).unwrap().mesh;
         assert!(triangles(&settling.0) == triangles(&saved), "pause {pause}");
         let [merged, fine] = [&settling.0, &following.0].map(|mesh| mesh.face_count() as f64);
-        // most of what was not touched yet is the scan
+        // most of the untouched part is the scan
         assert!(
             merged < 0.95 * fine,
             "{merged} of {fine} faces in pause {pause}"
@@ -352,7 +352,7 @@ fn two_threads_do_what_one_does_and_leave_the_scan_where_it_was() {
     let mut live = engine(&stream, pace, Gate::default());
     for (i, (sample, answer)) in stream.samples.iter().zip(&answers).enumerate() {
         assert_eq!(live.answer(sample).unwrap(), *answer, "sample {i}");
-        // what is not followed at once is followed before the next answer
+        // a skipped follow-up comes before the next answer
         if i % 7 != 0 {
             live.follow().unwrap();
         }
@@ -377,7 +377,7 @@ fn two_threads_do_what_one_does_and_leave_the_scan_where_it_was() {
 struct Kept {
     live: Engine,
     keeper: GateKeeper,
-    /// due times of the requested renewals, ns; the thread has done so many of them
+    /// due times of the requested renewals, ns; `done` counts the finished ones
     open: VecDeque<i64>,
     done: usize,
     slot: Option<i64>,
@@ -449,8 +449,8 @@ fn assert_knows_all(stream: &PlateStream, live: Engine) {
     assert!(whole(stream, &known) == whole(stream, &all_at_once));
 }
 
-/// The patch gets a permit for each 100 ms alone: every sample is taken all the same, the patch is
-/// renewed as often as it may be, each time late, and the result at the end is the same.
+/// The patch gets a permit for each 100 ms alone: the engine takes every sample all the same,
+/// renews the patch at each permit, each time late, and ends with the same result.
 #[test]
 fn a_late_patch_holds_no_sample_up_and_changes_nothing_of_the_result() {
     let stream = stream(5, 0.1);
@@ -480,7 +480,7 @@ fn a_late_patch_holds_no_sample_up_and_changes_nothing_of_the_result() {
     assert_knows_all(&stream, live);
 }
 
-/// Where the thread is done in time, no sample that waits would find another mesh.
+/// If the thread finishes in time, a sample that waits for it finds the same mesh.
 #[test]
 #[ignore = "a slow proof"]
 fn a_patch_in_time_equals_one_awaited_at_every_sample() {
@@ -507,8 +507,8 @@ fn a_patch_in_time_equals_one_awaited_at_every_sample() {
     assert_same(kept.live.refiner().mesh(), patient.refiner().mesh());
 }
 
-/// The patch is late by two renewals and all that came since when the samples end: while none comes
-/// the mesh goes on to what the patch knows of all of them, as it does by hand.
+/// The patch is late by two renewals and all later samples at their end: without new ones the mesh
+/// goes on to the patch of all of them, as it does by hand.
 #[test]
 fn without_samples_the_mesh_catches_up_with_the_patch() {
     let stream = stream(6, 0.05);
@@ -538,8 +538,8 @@ fn without_samples_the_mesh_catches_up_with_the_patch() {
         patcher.renew_far(&stream.scan, &tree);
         by_hand.begin_to_follow(&delta);
         while !by_hand.go_on_following(&delta, AT_ONCE).unwrap() {}
-        // nothing is done without a permit, and the third is requested when the first two are taken
-        // up
+        // the thread does nothing without a permit, and requests the third after the take-up of the
+        // first two
         live.rest().unwrap();
         assert_eq!(live.counts().renewals, k as u64);
         keeper.let_one_through();
@@ -646,8 +646,8 @@ fn triangles(mesh: &TriMesh) -> Vec<[[u64; 3]; 3]> {
     triangles
 }
 
-/// The reconstruction from the current evidence, to the last bit: triangles, and how well vertices
-/// are known; and the touches of which features are measured.
+/// The reconstruction from the current evidence, to the last bit: triangles, uncertainties of
+/// vertices, and the touches for features.
 fn whole(
     stream: &PlateStream,
     patcher: &Patcher,
@@ -665,7 +665,7 @@ fn strokes_are_undone_and_redone_bit_for_bit() {
     let stream = last_strokes(3, 0.2);
     let mut patcher = patcher(&stream);
     let mut again = patcher.clone();
-    // the samples with which a stroke begins to count …
+    // the samples with which a stroke begins to count
     let mut begun = Vec::new();
     let contacts = contacts(&stream);
     for (i, sample) in contacts.iter().enumerate() {
@@ -676,7 +676,7 @@ fn strokes_are_undone_and_redone_bit_for_bit() {
     patcher.flush();
     println!("{} strokes", begun.len());
     assert!(begun.len() >= 3);
-    // … and what was known just before each of them, and at the end
+    // the state just before each of them, and at the end
     let mut states = Vec::new();
     for (i, sample) in contacts.iter().enumerate() {
         if begun.contains(&i) {
@@ -710,8 +710,8 @@ fn take(engine: &mut Engine, samples: &[Sample]) {
     }
 }
 
-/// The samples go on while the evidence is made again without one in the middle; the last one goes
-/// when nothing comes any more.
+/// The samples go on while the thread makes the evidence again without one in the middle; the last
+/// one goes after the end of all samples.
 #[test]
 #[ignore = "a slow proof"]
 fn evidence_made_again_without_a_stroke_is_that_of_an_engine_that_never_took_it() {
@@ -781,7 +781,7 @@ fn evidence_made_again_without_a_stroke_is_that_of_an_engine_that_never_took_it(
 fn undoing_while_touching_brings_the_mesh_back() {
     let stream = last_strokes(4, 0.15);
     let mut live = engine(&stream, Pace::default(), Gate::default());
-    // the same without the last stroke: what came before it
+    // the same without the last stroke
     let mut before = patcher(&stream);
     let mut counted = patcher(&stream);
     let mut last_stroke = 0;
@@ -803,7 +803,7 @@ fn undoing_while_touching_brings_the_mesh_back() {
     assert!(live.redo().unwrap());
     let redone = triangles(live.refiner().mesh());
     assert!(undone != touched && undone != redone);
-    // the undone result is that of all strokes but the last at once …
+    // the undone result equals that of all strokes but the last at once
     contacts[..last_stroke]
         .iter()
         .for_each(|contact| before.push(contact));

@@ -1,5 +1,5 @@
-//! A refinement by its three ways in: a recording, messages that are there already, and samples
-//! that are pushed. By the first `touchup refine` and sweeps go, by the others the Python package.
+//! A refinement by its three ways in: a recording, messages in memory, and pushed samples. `touchup
+//! refine` and sweeps use the first, the Python package the others.
 
 use std::fs;
 use std::path::Path;
@@ -19,7 +19,7 @@ use touchup::session::RefinedMesh;
 use crate::cli::{flat_scan, touch};
 
 fn same_bits(one: &RefinedMesh, other: &RefinedMesh) -> bool {
-    // where nothing is known there is NaN
+    // unknown values are NaN
     let known = |of: &RefinedMesh| format!("{:?} {:?}", of.sigma, of.touches);
     one.mesh.positions() == other.mesh.positions()
         && one.mesh.faces().eq(other.mesh.faces())
@@ -62,7 +62,7 @@ fn a_recording_its_messages_and_its_samples_make_the_same_mesh() {
     };
     let again = Recording::of_messages(messages, wrench_frame);
     each_sample(again, placement, sync, None, &mut || {}, &mut |_| {}, push).unwrap();
-    // pushed samples move the mesh one by one, those of a recording are kept for the patch alone
+    // pushed samples move the mesh one by one, those of a recording wait for the patch alone
     assert!(moved > 100);
     let of_samples = pushed.finish(names).unwrap();
 

@@ -171,8 +171,8 @@ fn the_default_scene_is_the_preset_of_each_mode() {
     assert_eq!(scene.refine_params(WrenchFrame::Sensor), Some(rigid));
 }
 
-/// What a right result needs is there unless the scene says `off`; what only some sensors need is
-/// there where it is named.
+/// Sections that a right result needs are present unless the scene says `off`; those of some
+/// sensors are present if it names them.
 #[test]
 #[expect(clippy::too_many_lines)]
 fn a_scene_says_what_differs() {
@@ -622,7 +622,7 @@ fn the_shape_of_the_tip_reaches_refiner_and_patcher() {
         half_angle: 20f64.to_radians(),
         length: 6e-3,
     };
-    // what a sharp nose can show is limited by the hand
+    // the hand limits the resolution of a sharp nose
     assert_eq!(
         shapes("shape: cone, radius_mm: 0.25, half_angle_deg: 20, length_mm: 6"),
         (cone, 1e-3)
@@ -669,7 +669,7 @@ fn bias_tracking_is_built_only_when_named_and_not_in_the_paper() {
 // ---- settings put into the text
 // ---------------------------------------------------------------------------------
 
-/// A scene as a user wrote it, with what each calibration sets.
+/// A scene in a user's writing, with the values of each calibration.
 fn calibrated(yaml: &str) -> Result<String, SceneError> {
     let mut expected = if yaml.trim().is_empty() {
         Scene::default()
@@ -812,8 +812,8 @@ compensation: { payload: { mass_kg: 1, centre_mm: [1, 2, 3] }, # the new sensor
     }
 }
 
-/// However a scene is written, the result is right (which `edited` checks itself), or it is refused
-/// with what to do.
+/// For any form of a scene the result is right (which `edited` checks itself), or the error names
+/// the remedy.
 #[test]
 fn every_form_of_writing_is_edited_or_refused() {
     let forms = [
@@ -919,7 +919,7 @@ fn gravity_in_the_axes_of_space_turns_with_the_scan() {
             .unwrap()
             .gravity_o
     };
-    // the scan is turned by 90° about x of space: its y points up
+    // the scan has a turn of 90° about x of space: its y points up
     let turned = "scan_to_space: { orientation_xyzw: [0.7071068, 0, 0, 0.7071068] }";
     assert!(
         (scene("space", turned) - vector![0.0, -9.81, 0.0]).norm() < 1e-6,
@@ -940,7 +940,7 @@ fn gravity_in_the_axes_of_space_turns_with_the_scan() {
     assert_eq!(Scene::default().placement(), None);
 }
 
-/// Names as in the YAML, in its order, listed here by hand; each that is left out with its reason.
+/// Names as in the YAML, in its order, listed here by hand; each omitted one with its reason.
 #[test]
 fn a_scene_reports_what_is_built_of_it_and_what_is_left_out() {
     let unused = [
@@ -976,8 +976,8 @@ fn a_scene_reports_what_is_built_of_it_and_what_is_left_out() {
         )),
         "{off}"
     );
-    // the mode of the paper takes neither contact, sliding, carving, guard nor a patch, whatever is
-    // named
+    // the mode of the paper takes neither contact, sliding, carving, guard nor a patch, whatever
+    // the scene names
     let paper = built(
         "contact:\ntip:\nsliding:\ncarve:\npatch:\nuncertainty:\nguard:\nrefine: { mode: paper }",
     );
@@ -1000,8 +1000,8 @@ fn a_scene_reports_what_is_built_of_it_and_what_is_left_out() {
     assert_eq!(paper.built.len() + paper.left_out.len(), 18);
 }
 
-/// What is said to be left out is in no settings: of a part that the scene names and the published
-/// rule has not, none are left.
+/// The settings lack everything in the list of omissions: of a section that the scene names and the
+/// published rule lacks, nothing remains.
 #[test]
 fn what_is_left_out_is_not_in_the_settings() {
     let settings = |yaml: &str| {

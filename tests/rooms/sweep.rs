@@ -1,5 +1,5 @@
 //! `touchup sweep` and `touchup whatif` at the boundary of the process: ids, results that are whole
-//! or not there, tables, and what moved.
+//! or not there, tables, and reported changes.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -13,7 +13,7 @@ use touchup::sweep::{GivenInput, JobRunner, JobsFile};
 
 use crate::cli::{code, flat_scan, json as one_object, text, touch, touchup};
 
-/// A folder with a scan and a recording of [`touch`], and what is swept over them.
+/// A folder with a scan and a recording of [`touch`], for sweeps.
 struct Sweep {
     folder: tempfile::TempDir,
 }
@@ -63,7 +63,7 @@ impl Sweep {
         )
     }
 
-    /// The lines of a plan that is made.
+    /// The lines of a plan.
     fn jobs(&self) -> Vec<Value> {
         let planned = self.plan();
         assert_eq!((code(&planned), text(&planned.stderr)), (0, ""));
@@ -115,7 +115,7 @@ impl Sweep {
             .collect()
     }
 
-    /// What lies in the folder of the results, hidden names too.
+    /// The entries of the folder of the results, hidden names too.
     fn names_in(&self, results: &str) -> Vec<String> {
         names_in(&self.path(results))
     }
@@ -870,8 +870,8 @@ fn vertices_and_features_that_moved_by_more_than_the_larger_plus_minus_are_count
     );
 }
 
-/// The stylus is bent by 2 N: of 20 N/mm by 0.1 mm, of 10 N/mm by 0.2 mm. So the touched place
-/// comes out 0.1 mm higher.
+/// 2 N bend the stylus: of 20 N/mm by 0.1 mm, of 10 N/mm by 0.2 mm. So the touched place comes out
+/// 0.1 mm higher.
 #[test]
 fn a_softer_stylus_lifts_the_touched_place_by_the_difference_of_its_bending() {
     let sweep = Sweep::new("keys: { tip.radius_mm: 1.5, tip.stiffness_n_per_mm: [20, 10] }\n");
@@ -911,9 +911,9 @@ fn a_softer_stylus_lifts_the_touched_place_by_the_difference_of_its_bending() {
     assert_eq!(one_object(&same)["keys"], json!({}));
 }
 
-/// On the plate of the demo, where the stylus is said to be softer than it is, every touched
-/// surface comes out farther by the same bending: the top rises by it, holes and slot shrink and
-/// the boss grows by twice as much. What does not bend, the axes, stays.
+/// On the plate of the demo, with a stiffness stated below the true one, every touched surface
+/// comes out farther by the same bending: the top rises by it, holes and slot shrink and the boss
+/// grows by twice as much. Directions, free of bending, stay.
 #[test]
 #[ignore = "a slow proof"]
 #[expect(clippy::too_many_lines)]
@@ -938,7 +938,7 @@ fn the_plate_touched_by_a_softer_stylus_grows_everywhere_by_its_bending() {
     );
     assert_eq!(code(&planned), 0, "{}", text(&planned.stderr));
     assert_eq!(code(&touchup(&["sweep", "run", &at("jobs.jsonl")], "")), 0);
-    // the plan has the stiffnesses as they are listed
+    // the plan lists the stiffnesses in their order
     let report = one_object(&touchup(
         &["whatif", "0", "1", "--jobs", &at("jobs.jsonl"), "--json"],
         "",

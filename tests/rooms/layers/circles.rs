@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// Modules of one crate that use one another in a circle, each with those that it uses.
 fn circles(mut uses: Uses) -> Vec<String> {
-    // who is used by nobody left, or uses nobody left, is in no circle
+    // a module without users or without uses among the rest is in no circle
     loop {
         let left: BTreeSet<_> = uses.keys().cloned().collect();
         let used: BTreeSet<_> = uses.values().flatten().cloned().collect();
@@ -109,14 +109,14 @@ const IMPORTS: &str = "mod a; mod b; use a::A; use b::B; use serde::Serialize;";
 fn a_circle_is_found_however_it_is_closed() {
     let closed = [
         ("use super::b::B;", "use super::a::{self, A};", GIVES_ON),
-        // through what the parent gives on
+        // through a re-export of the parent
         ("use super::B;", "fn f() -> crate::mesh::A {}", GIVES_ON),
         (
             "use crate::mesh::{b::{B, C}, D};",
             "use super::{A};",
             "mod a; mod b; pub use a::A;",
         ),
-        // through what the parent has for itself
+        // through an import of the parent for itself
         ("use super::B;", "use super::A;", IMPORTS),
         // parent and child
         (

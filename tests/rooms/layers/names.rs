@@ -10,7 +10,7 @@ const HOMONYMS: Bound = Bound {
     wanted: 15,
 };
 
-/// Types that are named by no noun.
+/// Types without a noun as their name.
 const NO_NOUNS: Bound = Bound {
     today: 0,
     wanted: 0,

@@ -1,4 +1,4 @@
-//! The rooms: where a file belongs, and which other rooms it may use.
+//! The rooms: the files of each, and the other rooms that it may use.
 
 /// Each room and the rooms it may use; itself always. A room that is missing here fails the check.
 /// A crate of [`WHOLE`] is one room. Circles between crates need no check: cargo refuses them.
@@ -108,7 +108,7 @@ pub const MAY_USE_PYTHON: &[&str] = &[
     "crates/touchup-python/",
 ];
 
-/// What a pure crate may not name.
+/// Paths that a pure crate may not name.
 pub const IMPURE_PATHS: &[&str] = &[
     "std::fs",
     "std::thread",
@@ -158,12 +158,12 @@ pub const WITH_ROOMS: &[&str] = &[
     "touchup_node",
 ];
 
-/// Where a file is.
+/// Place of a file.
 pub struct Place<'a> {
     pub package: &'a str,
     /// empty for `lib.rs` and `main.rs` of a crate with several
     pub room: &'a str,
-    /// how many modules deep, where the crate has several rooms; 0 where all of it is one
+    /// depth of the module, if the crate has several rooms; 0 if all of it is one
     pub depth: usize,
 }
 

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-/// Functions of more than 60 lines of code, in all that is compiled: tests, benches, examples and
+/// Functions of more than 60 lines of code, in all compiled files: tests, benches, examples and
 /// fuzz targets too.
 const LONG_FUNCTIONS: Bound = Bound {
     today: 118,

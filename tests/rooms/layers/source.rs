@@ -10,7 +10,7 @@ pub struct Source<'a> {
     /// path from the root of the repository
     pub file: &'a str,
     /// words and signs of the code: `use crate::{io, mesh::TriMesh}` is use crate :: { io , mesh ::
-    /// TriMesh }; comments, strings, characters and `#[cfg(test)] mod … { … }` are left out
+    /// TriMesh }; without comments, strings, characters and `#[cfg(test)] mod … { … }`
     pub tokens: Vec<&'a str>,
     /// each line that is a comment alone, outside inline tests, with the number of tokens before it
     pub comments: Vec<(usize, &'a str)>,

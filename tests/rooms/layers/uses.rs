@@ -12,14 +12,14 @@ pub type Uses<'a> = BTreeMap<Module<'a>, BTreeSet<Module<'a>>>;
 
 /// One crate.
 pub struct Crate {
-    /// where its sources are
+    /// folder of its sources
     pub folder: String,
     pub uses: Uses<'static>,
     /// the modules of its tests
     pub tests: BTreeSet<Module<'static>>,
 }
 
-/// All crates whose sources are read.
+/// All crates of the repository with sources.
 pub static CRATES: LazyLock<Vec<Crate>> = LazyLock::new(|| {
     let mut crates: BTreeMap<_, Vec<_>> = BTreeMap::new();
     for source in SOURCES.iter() {
@@ -139,9 +139,9 @@ fn module_in(file: &str) -> Vec<&str> {
     }
 }
 
-/// The module in which what a path names is defined: its longest start that is one, through what
-/// modules import, for themselves or for others; the root, which uses none, for what is of another
-/// crate.
+/// The module that defines the item of a path: the longest start of the path that is a module,
+/// followed through imports and re-exports of modules; for an item of another crate the root, which
+/// uses none.
 fn module_of<'a>(
     path: &[&'a str],
     modules: &Modules<'a>,

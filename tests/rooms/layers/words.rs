@@ -71,7 +71,7 @@ impl Comments {
         }
     }
 
-    /// The word "what", however it is used: a comment asks nothing, and names things by nouns.
+    /// The word "what" in any use: a comment asks nothing, and names things by nouns.
     fn whats(&self) -> usize {
         self.count(|words| words[0] == "what")
     }

@@ -408,8 +408,8 @@ impl Edited {
         }
     }
 
-    /// Uses the plan of an earlier call where the star of its vertex is still the same, and makes
-    /// the next one.
+    /// Uses the plan of an earlier call if the star of its vertex is still the same, and makes the
+    /// next one.
     fn move_planned(&mut self, rng: &mut Pcg64) {
         if let Some((vertex, faces)) = self.planned.take()
             && self.mesh.star(vertex) == faces
@@ -502,7 +502,7 @@ proptest! {
     }
 }
 
-/// A face that is pushed by small steps, and the boxes that are brought up to date after it.
+/// A face that moves by small steps, and the boxes refitted after it.
 #[derive(Default)]
 struct Pushed {
     face: Option<FaceId>,
@@ -593,8 +593,7 @@ fn most_levels(faces: usize) -> usize {
     (faces as f64 / 5.0).log(1.25).max(0.0) as usize + 2
 }
 
-/// Spots that move over the mesh: faces are cut in two there and put together again, some of it
-/// stays.
+/// Spots that move over the mesh: each cuts faces in two and joins them again, and some cuts stay.
 #[test]
 fn a_long_session_leaves_the_tree_shallow_small_and_exact() {
     let mut rng = Pcg64::seed_from_u64(8);

@@ -6,7 +6,7 @@ use nalgebra::Point3;
 use proptest::prelude::*;
 use touchup::mesh::{Changes, FaceId, TriMesh, VertexId};
 
-/// One edit; numbers are taken modulo the current counts.
+/// One edit; numbers count modulo the current counts.
 #[derive(Clone, Debug)]
 enum Edit {
     Move(usize, f64),
@@ -122,8 +122,8 @@ fn without_watching_nothing_is_recorded() {
     assert!(mesh.take_changes(usize::MAX, &mut changes) && changes == Changes::default());
 }
 
-/// As many vertices as are taken at once, and more faces than that: it is not complete until those
-/// are reported, too.
+/// As many vertices as one call takes, and more faces than that: the answer is incomplete until it
+/// has reported those, too.
 #[test]
 fn it_is_not_all_while_faces_are_left() {
     let mut mesh = square();

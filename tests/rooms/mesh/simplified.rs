@@ -1,4 +1,4 @@
-//! Simplified meshes against closed forms, and how motion is carried over to the original.
+//! Simplified meshes against closed forms, and the transfer of motion to the original.
 
 use nalgebra::{Point3, Rotation3, UnitQuaternion, Vector3, vector};
 use touchup::mesh::{SimplifiedMesh, TriMesh, VertexId};
@@ -152,7 +152,8 @@ fn fine_detail_rides_along_and_what_does_not_move_stays_bit_by_bit() {
         assert!((q - p - shift).norm() < 1e-12);
     }
 
-    // tilted about an axis in the plane, no vertex where it was: every one turns with its normal
+    // tilted about an axis in the plane, no vertex at its old place: every one turns with its
+    // normal
     let turn = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), 0.4);
     let flat = SimplifiedMesh::new(&grid(120, 0.1, |_, _| 0.0), 0.8).unwrap();
     let turned = flat.carry(&scan, &moved(&flat.mesh, |p| turn * p + shift));
@@ -161,7 +162,7 @@ fn fine_detail_rides_along_and_what_does_not_move_stays_bit_by_bit() {
         assert!((q - expected * p - shift).norm() < 1e-9, "{p} went to {q}");
     }
 
-    // one vertex alone: what lies beyond its faces stays
+    // one vertex alone: everything beyond its faces stays
     let mut dented = simplified.mesh.clone();
     let middle = (0..dented.vertex_slots() as u32)
         .map(VertexId)

@@ -1,6 +1,6 @@
-//! Probing until a characteristic is decided, against a fixed uncertainty and a fixed pattern. The
-//! contacts are simulated, and scatter as they are stated to: it shows that decisions and stated
-//! risk agree, and not what a real arm reaches.
+//! Probing until the decision of a characteristic, against a fixed uncertainty and a fixed pattern.
+//! Simulated contacts scatter as stated: the test shows that decisions and stated risk agree, and
+//! not the performance of a real arm.
 
 use std::fmt::Write as _;
 
@@ -97,8 +97,8 @@ fn params(budget: usize) -> PatternParams {
     }
 }
 
-/// Explores with noise of each touch, and a ball that differs from what is told; after each touch
-/// `look` sees what is known.
+/// Explores with noise of each touch, and a ball that differs from the told one; `look` sees the
+/// explorer after each touch.
 fn explored(
     case: &Case,
     params: PatternParams,
@@ -326,9 +326,8 @@ impl Tally {
     }
 }
 
-/// Far from its limits a number is decided with the touches that fix the shape; near them with no
-/// more than the fixed uncertainty needs which decides these; and of the decisions of all hardly
-/// any is wrong.
+/// Far from its limits the touches that fix the shape decide a number; near them no more than the
+/// fixed uncertainty needs to decide these; and hardly any of all decisions is wrong.
 #[test]
 #[ignore = "a slow proof"]
 fn deciding_takes_the_touches_that_the_distance_from_the_limit_asks_for() {
@@ -400,7 +399,7 @@ fn looking_after_each_touch_keeps_the_stated_risk() {
         for seed in 0..seeds {
             let mut rng = Pcg64::seed_from_u64(7000 + seed);
             let mut first = [None, None];
-            // one that never ends, so that both are seen on the same touches
+            // never ends the probing, so that both rules see the same touches
             let mut look = |explorer: &Explorer| {
                 let standing = explorer.characteristics();
                 let Some(number) = standing[0].measured else {
@@ -450,8 +449,8 @@ fn looking_after_each_touch_keeps_the_stated_risk() {
     }
 }
 
-/// Of a hole on its limit nothing is said as long as touches alone are uncertain; where the radius
-/// of the ball is, that is said at once.
+/// For a hole on its limit the explorer goes on while touches alone are uncertain; with an
+/// uncertain radius of the ball it says so at once.
 #[test]
 fn a_value_on_its_limit_stays_undecided_and_says_why() {
     let limits = limits(&HOLE, 1.0);
@@ -489,7 +488,7 @@ fn a_value_on_its_limit_stays_undecided_and_says_why() {
     );
 }
 
-/// One touch fewer than the shape needs, and a value far beyond its limits: nothing is decided.
+/// One touch fewer than the shape needs, and a value far beyond its limits: no decision.
 #[test]
 fn too_few_touches_for_the_shape_decide_nothing() {
     for budget in [12, 14] {

@@ -16,14 +16,14 @@ use touchup::sim::{Plate, Surface as _};
 use super::plan::{SIGMA, TOP, normal_of, on, probe};
 use crate::plate_stream::plate_scan;
 
-/// As high as a wall is touched at the least, and as deep in the hole and in the slot (whose floor
-/// is 5 mm below its opening), m.
+/// Least depth of touches on a wall, and the largest in the hole and in the slot (whose floor is 5
+/// mm below its opening), m.
 const HIGHEST: f64 = 1.05e-3;
 const IN_HOLE: f64 = 5e-3;
 const IN_SLOT: f64 = 3.2e-3;
-/// So far around an opening the surface belongs to its region: two balls, m.
+/// Width of the surface around an opening that belongs to its region: two balls, m.
 const AROUND: f64 = 3e-3;
-/// That walls are perpendicular to their surface is believed within this, by both, rad.
+/// Assumed deviation of walls from the perpendicular to their surface, by both methods, rad.
 const SQUARE: f64 = 2.27e-3;
 
 /// Shares of two lengths, evenly in the rectangle of both for any number of places: R2 of Roberts,
@@ -79,8 +79,8 @@ const SLOT: Opening = Opening {
 /// Errors of place, size, second size, lean; m, and rad times 4 mm.
 type Errors = [f64; 4];
 
-/// Axis of walls, of height 1, that lean as is believed of them. Of walls that are all square a fit
-/// would err the less the less it is told: it takes them for square where touches say nothing.
+/// Axis of walls, of height 1, with the assumed deviation of their lean. With square walls a fit
+/// would err the less the fewer its data: without touches it assumes square ones.
 fn drawn_axis(rng: &mut Pcg64) -> Vector3<f64> {
     let mut lean = || SQUARE * rng.sample::<f64, _>(StandardNormal);
     Vector3::new(lean(), lean(), 1.0)
@@ -95,7 +95,7 @@ fn lean_error(found: &Vector3<f64>, axis: &Vector3<f64>) -> f64 {
 type OnSurface<'a> = &'a dyn Fn(&Point3<f64>) -> (Point3<f64>, Vector3<f64>);
 
 impl Opening {
-    /// Places evenly over what a scan has of it, wall and surface around it, by their areas.
+    /// Places evenly over the scanned region, wall and surface around it, by their areas.
     fn grid(&self, count: usize, rng: &mut Pcg64) -> [Vec<Point3<f64>>; 2] {
         let around = 4.0 * self.half + TAU * self.radius;
         let wall = around * (self.deep - HIGHEST);
@@ -116,8 +116,8 @@ impl Opening {
         [walls.collect(), top.collect()]
     }
 
-    /// Errors of as many touches spread evenly, where the scan has the opening 0.2 mm and 0.01 rad
-    /// off (standard deviations); `None` where they leave an end of a slot open.
+    /// Errors of as many touches spread evenly, with the opening 0.2 mm and 0.01 rad off in the
+    /// scan (standard deviations); `None` if they leave an end of a slot open.
     #[expect(clippy::too_many_lines)]
     fn grid_errors(&self, count: usize, axis: &Vector3<f64>, rng: &mut Pcg64) -> Option<Errors> {
         let mut draw = |sigma: f64| sigma * rng.sample::<f64, _>(StandardNormal);
@@ -209,7 +209,7 @@ impl Opening {
         let mut some = |most: f64| rng.random_range(-most..most);
         let flag = self.middle + Vector3::new(some(1.4e-3), some(1.4e-3), some(0.2e-3));
         let normal = Unit::new_normalize(Vector3::new(some(0.03), some(0.03), 1.0));
-        // all touches are made
+        // the explorer uses all touches
         let params = PatternParams {
             sigma: 1e-9,
             quantity,
@@ -252,13 +252,13 @@ fn rms(errors: &[Errors]) -> Errors {
     })
 }
 
-/// The place where an axis meets the surface is extrapolated from the wall between depths a and b.
-/// With touches of variance σ² in n places evenly around and evenly over the depths its variance
-/// along each direction is 2σ²/n (1 + m²/v), with m = (a + b)/2 and v = (b − a)²/12; the best n
-/// touches, at a and b alone, leave 2σ²/n ((b + a)/(b − a))² \[Elfving 1952\]. With r = (b + a)/(b
-/// − a) the ratio of errors is r/√(1 + 3r²): one half where the wall can be touched up to its
-/// opening, 0.577 for a thin strip; no plan can do better against a grid on the same wall. The sums
-/// below are those of two and of many depths.
+/// Extrapolation of the wall between depths a and b gives the place of an axis at the surface. With
+/// touches of variance σ² in n places evenly around and evenly over the depths its variance along
+/// each direction is 2σ²/n (1 + m²/v), with m = (a + b)/2 and v = (b − a)²/12; the best n touches,
+/// at a and b alone, leave 2σ²/n ((b + a)/(b − a))² \[Elfving 1952\]. With r = (b + a)/(b − a) the
+/// ratio of errors is r/√(1 + 3r²): one half for a wall with touches up to its opening, 0.577 for a
+/// thin strip; no plan can do better against a grid on the same wall. The sums below are those of
+/// two and of many depths.
 #[test]
 fn no_plan_halves_the_error_of_a_grid_on_the_same_wall() {
     for (low, high) in [(0.0f64, 5.0), (1.05, 5.0), (1.05, 3.2), (3.0, 3.5)] {
@@ -296,11 +296,11 @@ fn no_plan_halves_the_error_of_a_grid_on_the_same_wall() {
     }
 }
 
-/// With as many touches as the plan made, misses and the search for the opening included, against
-/// touches spread evenly over wall and surface around it as a scan has them, which is spared that
-/// search, and with the same belief in square walls: the place is better by a third at the least,
-/// and no number that is asked for is worse. Half the error of the place is what is wanted; 0.49 to
-/// 0.58 are reached by 200 seeds.
+/// With as many touches as the plan made, including misses and the search for the opening, against
+/// touches spread evenly over wall and surface around it as in a scan, without that search, and
+/// with the same assumption of square walls: the place is better by a third at the least, and no
+/// requested number is worse. The goal is half the error of the place; 200 seeds reach 0.49 to
+/// 0.58.
 #[test]
 #[ignore = "a slow proof"]
 fn planned_touches_are_better_than_a_grid_over_the_region() {

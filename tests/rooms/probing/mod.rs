@@ -1,4 +1,4 @@
-//! The arm, where it touches next, and a probing from flag to feature.
+//! The arm, the choice of its next touch, and a probing from flag to feature.
 
 mod arm;
 mod decided;

@@ -1,4 +1,4 @@
-//! Where the next touch goes.
+//! The place of the next touch.
 
 use std::f64::consts::TAU;
 
@@ -47,8 +47,8 @@ fn wall() -> Vec<Candidate> {
         .collect()
 }
 
-/// Up to `count` touches, each as if those before had been made, until all is known as it is asked
-/// for.
+/// Up to `count` touches, each on the assumption that those before exist, until all numbers reach
+/// their requested uncertainty.
 fn plan<M: SurfaceModel>(
     mut known: Knowledge,
     surface: &M,
@@ -110,7 +110,7 @@ fn predicted_and_fitted_covariance_agree() {
     }
 }
 
-/// The tilt of a plane is determined by its corners, its height by any place.
+/// The corners of a plane determine its tilt, any place its height.
 #[test]
 fn the_tilt_of_a_plane_is_asked_at_its_corners() {
     let surface = Plane::new(Point3::origin(), &Vector3::z());
@@ -199,7 +199,7 @@ fn touches_are_as_many_as_the_goal_asks_for() {
     assert!(counts.is_sorted() && counts[0] < counts[2], "{counts:?}");
 }
 
-/// A feature with a requested dimension: where it could be touched, and a grid over all of it.
+/// A feature with a requested dimension: the possible touches, and a grid over all of it.
 struct Case<M> {
     name: &'static str,
     truth: M,
@@ -231,7 +231,7 @@ pub(super) fn on<M: SurfaceModel>(surface: &M, p: &Point3<f64>) -> Point3<f64> {
 }
 
 /// Deviation of the numbers together, by the inverse of the information of all touches at once,
-/// with derivatives from differences of the distance of surfaces that are moved.
+/// with derivatives from differences of the distance of displaced surfaces.
 fn sigma_by_differences<M: SurfaceModel>(
     truth: &M,
     touches: &[Point3<f64>],
@@ -266,9 +266,9 @@ fn sigma_by_differences<M: SurfaceModel>(
     asked.iter().map(variance).sum::<f64>().sqrt()
 }
 
-/// Touches of a planned pattern and of a grid of as many, where the surface is known as badly as
-/// after the first touches: it is planned for one that lies and leans elsewhere and has other
-/// sizes, and the true one is touched. Root mean square error of the number over 20 such surfaces
+/// Touches of a planned pattern and of a grid of as many, with the poor knowledge of the surface
+/// after the first touches: the plan is for one that lies and leans elsewhere and has other sizes,
+/// and the touches meet the true one. Root mean square error of the number over 20 such surfaces
 /// with 10 draws of noise each, and the ratio of both.
 ///
 /// Both are those of the information matrix of the touches, and the best of 300 patterns of random
@@ -433,16 +433,16 @@ fn circle(count: usize) -> Vec<Point3<f64>> {
         .collect()
 }
 
-/// Where the axis goes through z = 0.
+/// Crossing of the axis with z = 0.
 fn opening(hole: &Cylinder) -> Point3<f64> {
     let (c, axis) = (hole.center(), hole.axis());
     c - axis * (c.z / axis.z)
 }
 
-/// Planned touches beat a grid of as many over the feature itself by about half where some of the
+/// Planned touches beat a grid of as many over the feature itself by about half if some of the
 /// feature is little informative about the number: the walls of a slot of its length, touches near
-/// the axis' own plane of a lean. Where all touches are equally informative, as of a diameter, no
-/// plan can be better, and it must not be worse.
+/// the axis' own plane of a lean. If all touches are equally informative, as of a diameter, no plan
+/// can be better, and it must not be worse.
 #[test]
 #[expect(clippy::too_many_lines)]
 fn planned_touches_beat_a_uniform_grid() {
@@ -531,8 +531,8 @@ fn planned_touches_beat_a_uniform_grid() {
     }
 }
 
-/// Contact of a ball that is let down and then moved in a straight line until it meets the
-/// material, exactly, with noise along its path; a path that is blocked before measures nothing.
+/// Contact of a ball that goes down and then in a straight line until it meets the material,
+/// exactly, with noise along its path; an obstacle before that gives no measurement.
 pub(super) fn probe(
     distance: &dyn Fn(&Point3<f64>) -> f64,
     planned: &TouchPlan,
@@ -563,8 +563,8 @@ pub(super) fn probe(
     })
 }
 
-/// Explores from a flag, on what lies as far as is said, with noise of a touch; the flag's normal
-/// leans by up to 3°.
+/// Explores from a flag, on a feature with distance function `surface`, with noise of a touch; the
+/// flag's normal leans by up to 3°.
 fn explored(
     kind: FeatureKind,
     flag: Point3<f64>,
@@ -597,8 +597,7 @@ pub(super) const TOP: f64 = 12e-3;
 /// Middle of its slot: 20 × 6 mm along x, 5 mm deep.
 const SLOT: Point3<f64> = Point3::new(25e-3, 14e-3, TOP);
 
-/// Wherever in it a slot is flagged: claimed dimensions agree with the drawing, and most are
-/// claimed.
+/// For a flag anywhere in a slot: claimed dimensions agree with the drawing, and most have a claim.
 #[test]
 #[ignore = "a slow proof"]
 fn a_slot_that_is_claimed_is_the_one_of_the_drawing() {
@@ -643,7 +642,7 @@ fn a_slot_that_is_claimed_is_the_one_of_the_drawing() {
     assert!(claimed * 100 >= 95 * count, "{claimed} of {count}");
 }
 
-/// A pin in the slot: the slot does not end where it was met.
+/// A pin in the slot: the slot does not end at the pin.
 #[test]
 #[ignore = "a slow proof"]
 fn an_obstacle_in_a_slot_is_not_its_end() {
@@ -668,7 +667,7 @@ fn an_obstacle_in_a_slot_is_not_its_end() {
     }
 }
 
-/// A groove that runs through the whole plate has no length, and none is reported.
+/// A groove through the whole plate has no length and reports none.
 #[test]
 fn a_slot_without_ends_is_reported_as_such() {
     let mut rng = Pcg64::seed_from_u64(23);
@@ -698,8 +697,8 @@ fn a_slot_without_ends_is_reported_as_such() {
     }
 }
 
-/// A touch that met something else does not make a hole of it: one in six of its walls is met 0.3
-/// to 1 mm before it.
+/// Touches of something else do not make a hole: one in six of its walls meets something 0.3 to 1
+/// mm before it.
 #[test]
 fn a_hole_is_not_claimed_from_touches_of_something_else() {
     let (plate, mut rng) = (Plate::default(), Pcg64::seed_from_u64(24));
@@ -761,8 +760,8 @@ fn a_hole_is_not_claimed_from_touches_of_something_else() {
     );
 }
 
-/// What ends the probing of a feature whose contacts are off by what a case says of a place and the
-/// number of its touch, m in O; with noise.
+/// Ending of the probing of a feature whose contacts are off by `off` of a place and the number of
+/// its touch, m in O; with noise.
 fn displaced(
     kind: FeatureKind,
     flag: [f64; 3],
@@ -804,7 +803,7 @@ const SLOT_AT: (FeatureKind, [f64; 3]) = (FeatureKind::Slot, [25.0, 14.0, 12.0])
 const BOSS_AT: (FeatureKind, [f64; 3]) = (FeatureKind::Boss, [47.0, 25.0, 16.0]);
 const EDGE_AT: (FeatureKind, [f64; 3]) = (FeatureKind::Edge, [58.5, 24.5, 12.0]);
 
-/// In the others it was known as it was asked for before three of them were met.
+/// The others reach the requested uncertainty before three of them.
 const AGREEING: [Agreeing; 3] = [
     (
         "plane with a step",
@@ -874,8 +873,8 @@ fn a_burr_or_two_stay_outliers() {
     assert!(claimed[0] >= 55 && claimed[1] >= 45, "{claimed:?}");
 }
 
-/// A boss of which one of the first three directions met nothing is touched in more of them, or not
-/// measured at all.
+/// A boss with a miss in one of the first three directions gets touches in more of them, or no
+/// measurement at all.
 #[test]
 fn a_boss_is_measured_from_three_walls_at_the_least() {
     let (plate, mut rng) = (Plate::default(), Pcg64::seed_from_u64(25));
@@ -963,9 +962,9 @@ fn near_edges(kind: Option<FeatureKind>, p: &Point3<f64>) -> f64 {
 }
 
 /// Features 2 to 3 mm from the edges of a part, and an edge and a plane that end near their flags:
-/// all are measured, and no touch goes down beside the part. The scan is 0.3 mm too large on all
-/// sides, and knows of no opening. Without its outline, as if the part went on on all sides,
-/// touches go there.
+/// the explorer measures all, and no touch goes down beside the part. The scan is 0.3 mm too large
+/// on all sides, and knows of no opening. Without its outline, as of an endless part, touches go
+/// there.
 #[test]
 #[expect(clippy::too_many_lines)]
 fn no_touch_is_planned_beside_the_part() {
@@ -998,7 +997,7 @@ fn no_touch_is_planned_beside_the_part() {
                     // within a cell of the outline, 0.2 mm
                     let is_over = (-0.5e-3..40.5e-3).contains(&from.x)
                         && (-0.5e-3..30.5e-3).contains(&from.y);
-                    // a wall that is touched from outside ends where the part does
+                    // a wall touched from outside ends with the part
                     let is_wall =
                         kind == Some(FeatureKind::Edge) && planned.direction.z.abs() < 0.5;
                     if planned.direction.z < -0.9 && !is_over || is_wall && from.y < -0.5e-3 {

@@ -11,8 +11,8 @@ use touchup::probing::plan::{Explorer, PatternParams};
 
 use super::plan::{SIGMA, TOP, flat, probe};
 
-/// A pocket in the plane z = 12 mm about a place, of which corners are rounded, turned; 6 mm deep.
-/// In m and rad.
+/// A turned pocket in the plane z = 12 mm about a place, with rounded corners; 6 mm deep. In m and
+/// rad.
 struct Pocket {
     middle: [f64; 2],
     length: f64,
@@ -39,8 +39,8 @@ impl Pocket {
     }
 }
 
-/// Probes a pocket; what it is off, in place, direction over half its length, width and length, m,
-/// or why not.
+/// Probes a pocket; returns the errors of place, direction over half its length, width and length,
+/// m, or the reason of a refusal.
 fn measured(
     pocket: &Pocket,
     kind: FeatureKind,

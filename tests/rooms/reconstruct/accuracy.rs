@@ -33,7 +33,7 @@ fn case(stylus: &StylusParams, seed: u64) -> Case {
     case_with(stylus, seed, |_| {})
 }
 
-/// … with other settings than those that hold for the tip.
+/// The same with other settings than those of the tip.
 fn case_with(stylus: &StylusParams, seed: u64, change: impl Fn(&mut PatcherParams)) -> Case {
     let (
         PlateStream {
@@ -117,12 +117,12 @@ impl Case {
 /// axes alone, 8 r for 2 π r.
 const ZIGZAG: f64 = 4.0 / std::f64::consts::PI;
 
-/// New rims of a patched plate, m: rims of the scan are where they were.
+/// New rims of a patched plate, m, without the rims of the scan.
 #[derive(Debug, Default)]
 struct Rims {
     /// length at each opening of the drawing, by its name, and the most that it can have
     openings: BTreeMap<&'static str, [f64; 2]>,
-    /// anywhere else, where the part has none
+    /// anywhere else on the part, which has none there
     elsewhere: f64,
 }
 
@@ -251,8 +251,8 @@ pub fn sample(at: usize, p_mm: [f64; 3], newtons: f64) -> Sample {
 }
 
 /// A ball goes round and round in a moat of 12 mm across, down to its floor at z = -9.5 mm, which
-/// it touches from `inner_mm` off the middle on. The middle is a post where the floor below it was
-/// not reached, and else floats.
+/// it touches from `inner_mm` off the middle on. The middle is a post if the ball did not reach the
+/// floor below it, and else floats.
 #[test]
 fn what_the_ball_went_all_around_is_no_part() {
     const MOAT_MM: f64 = 6.0;
@@ -299,7 +299,7 @@ fn what_the_ball_went_all_around_is_no_part() {
     );
 }
 
-/// Where a vertical line meets a triangle: z, m.
+/// Crossing of a vertical line with a triangle: z, m.
 fn height_over([a, b, c]: &[Point3<f64>; 3], x: f64, y: f64) -> Option<f64> {
     let cross = |p: &Point3<f64>, q: &Point3<f64>| (p.x - x) * (q.y - y) - (p.y - y) * (q.x - x);
     let shares = [cross(b, c), cross(c, a), cross(a, b)];
@@ -417,7 +417,7 @@ fn the_same_samples_make_the_same_mesh() {
     assert!(a.faces().eq(b.faces()));
 }
 
-/// What a tip leaves of the plate.
+/// Expected result of a tip on the plate.
 struct Expected {
     /// the one opening that gets a rim; `None`: one hand leaves others open than the next
     opened: Option<&'static str>,
@@ -433,7 +433,7 @@ const OF_A_BALL: Expected = Expected {
     back_mm: 0.05,
 };
 
-/// All of them are measured before one of them fails.
+/// Measures all of them before one of them fails.
 fn are_right(styli: &[(&str, StylusParams, Expected)]) {
     println!("mean distances, mm, from the part to the mesh and back; rims, m");
     let mut wrong = Vec::new();

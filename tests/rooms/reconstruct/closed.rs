@@ -1,4 +1,4 @@
-//! A closed scan stays closed, wherever the ball is said to have been.
+//! A closed scan stays closed, for any places of the ball.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use rand::SeedableRng;
@@ -109,7 +109,7 @@ fn walks_in_and_out_of_a_closed_scan_open_no_edge() {
     }
 }
 
-/// The mesh that follows, bit by bit, is closed after each renewal.
+/// The mesh that follows, bit by bit, closes after each renewal.
 #[test]
 fn a_closed_scan_that_follows_its_patch_is_closed_all_along() {
     for (name, scan, start) in parts() {

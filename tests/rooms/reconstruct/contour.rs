@@ -49,7 +49,7 @@ fn node_values(lattice: &Lattice, region: &LatticeRegion, field: Field) -> NodeV
     values
 }
 
-/// Where the field changes its sign, by bisection; its normal by differences.
+/// Sign change of the field, by bisection; its normal by differences.
 fn crossing(lattice: &Lattice, field: Field, edge: &Edge) -> Crossing {
     let [mut a, mut b] = [edge.node, edge.end()].map(|node| lattice.position(node));
     let is_inside = field(&a) < 0.0;
@@ -171,8 +171,8 @@ fn a_box_keeps_its_edges_and_corners() {
             sum += distance / 123.0;
         }
     }
-    // a cell that the edge passes without a crossing on either side of it cannot know of it: there
-    // a corner is cut off
+    // a cell that the edge passes without a crossing on either side of it cannot detect it: there
+    // the contour cuts off a corner
     assert!(
         worst < 0.3 * PITCH && sum < 0.05 * PITCH,
         "worst {}, mean {} pitches",
@@ -238,7 +238,7 @@ fn waves(seed: u64, shortest: f64) -> impl Fn(&Point3<f64>) -> f64 {
     }
 }
 
-/// f = 0 within a ball, so that the surface is closed.
+/// f = 0 within a ball, so that the surface closes.
 fn enclosed(field: impl Fn(&Point3<f64>) -> f64, radius: f64) -> impl Fn(&Point3<f64>) -> f64 {
     move |p| field(p).max(p.coords.norm() - radius)
 }
@@ -295,7 +295,7 @@ fn region_around(
     region
 }
 
-/// Adds what is beyond open squares that the scan crosses, until there are none: no region grows by
+/// Adds the cells beyond open squares that the scan crosses, until none remain: no region grows by
 /// more rounds than this.
 fn close_region(
     lattice: &Lattice,
@@ -366,7 +366,7 @@ fn spliced(scan: &TriMesh, patch: &Patch, pitch: f64) -> TriMesh {
         .difference(&before.rims)
         .map(|rim| rim.map(|v| positions[v as usize]))
     {
-        // a rim of the scan that was cut in two is no new one
+        // a rim of the scan in two parts is no new one
         let is_on_old = before.rims.iter().any(|old| {
             let [a, b] = old.map(|v| positions[v as usize]);
             rim.iter()
@@ -656,8 +656,8 @@ proptest! {
         let scan = thin_sheet(edge, noise * edge, thickness * share * edge, seed);
         let lattice = lattice(share * edge);
         let (patch, mesh) = splice_own(&lattice, &mut crumbs(&lattice, &scan, seed, 12), &scan);
-        // both sides on one edge cannot be distinguished by signs; with smaller cells all is
-        // closed, and no hole is made
+        // signs cannot distinguish both sides on one edge; with smaller cells everything closes,
+        // and no hole appears
         prop_assert!(thickness < 1.5 || (patch.open.is_empty() && soundness(&mesh).rims.is_empty()));
         prop_assert!(thickness < 2.2 || soundness(&mesh).euler == 2);
     }

@@ -1,4 +1,4 @@
-//! What settings cost is known before anything is built.
+//! Settings give their cost before any reconstruction.
 
 use std::f64::consts::PI;
 

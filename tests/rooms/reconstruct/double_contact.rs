@@ -1,4 +1,4 @@
-//! A ball in an inner corner and in a slot barely wider than itself: no normal is invented between
+//! A ball in an inner corner and in a slot barely wider than itself: no normal appears between
 //! those of the walls.
 
 use nalgebra::{Point3, UnitVector3, Vector3};
@@ -252,8 +252,8 @@ fn no_normal_is_invented_between_two_walls() {
                 "{name}, friction {friction}: {:.1} % farther than 5 degrees",
                 share * 1e2
             );
-            // what stays is from before both walls were known, and from where the ball changes from
-            // one to the other
+            // the rest comes from before the contact with both walls, and from the ball's change
+            // from one to the other
             assert!(share < most, "{name}, friction {friction}: {share}");
         }
     }
@@ -266,8 +266,8 @@ fn what_the_ball_cannot_reach_is_marked() {
     for (_, corners) in patched.mesh.faces() {
         for v in corners {
             let (p, support) = (patched.mesh.position(v), patched.support[v.0 as usize]);
-            // a ball in the corner touches both walls its radius away from it; the ends of the
-            // strokes are left out
+            // a ball in the corner touches both walls its radius away from it; the count omits the
+            // ends of the strokes
             let along = p.x.max(p.z);
             if p.y.abs() > 4e-3 || p.x.min(p.z) > 0.3e-3 || support == Support::Scan {
                 continue;
@@ -284,7 +284,7 @@ fn what_the_ball_cannot_reach_is_marked() {
     }
     println!("in the corner {fillet:?}, on the walls {walls:?}: reachable, not");
     assert!(fillet[1] > 50 && fillet[1] > 10 * fillet[0], "{fillet:?}");
-    // few: faces of a plane are merged
+    // few: the mesh merges faces of a plane
     assert!(walls[0] > 100 && walls[0] > 100 * walls[1], "{walls:?}");
 }
 

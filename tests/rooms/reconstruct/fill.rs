@@ -1,4 +1,4 @@
-//! What was not scanned: it is as it was touched, and nothing is made up beyond.
+//! Unscanned regions: they follow the touches, and nothing appears beyond.
 
 use nalgebra::{Point3, Vector3};
 use touchup::mesh::{FaceTree, TriMesh};
@@ -54,7 +54,7 @@ fn off_plane(mesh: &TriMesh, height_mm: f64) -> f64 {
     places.map(distance).fold(0.0, f64::max)
 }
 
-/// The scan of the upper face of a part of 10 mm, whose lower face is touched.
+/// The scan of the upper face of a part of 10 mm, with touches on its lower face.
 #[test]
 fn nothing_is_beyond_a_back_that_was_touched() {
     const BACK_MM: f64 = -10.0;
@@ -71,7 +71,7 @@ fn nothing_is_beyond_a_back_that_was_touched() {
     assert!(off < 0.05 && lowest > BACK_MM - 0.05, "{off} {lowest} mm");
 }
 
-/// A sheet with an opening of 14 mm × 14 mm, whose walls were scanned down to 1 mm.
+/// A sheet with an opening of 14 mm × 14 mm, its walls scanned down to 1 mm.
 fn opened() -> TriMesh {
     let (sheet, is_in) = (sheet(), |x: f64| (13e-3..27e-3).contains(&x));
     let is_left = |corners: &[Point3<f64>; 3]| {

@@ -1,4 +1,4 @@
-//! Where the ball was there is no mesh.
+//! The space that the ball swept is free of mesh.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use touchup::mesh::{FaceTree, TriMesh};
@@ -10,8 +10,8 @@ use crate::reconstruct::accuracy::sheet;
 use crate::reconstruct::closed::cube;
 
 const RADIUS: f64 = 1.5e-3;
-/// The mesh is made of chords: of a circle of that radius, across a cell of half a radius, they are
-/// this far inside.
+/// The mesh consists of chords: for a circle of that radius, across a cell of half a radius, they
+/// are this far inside.
 const CHORD: f64 = 0.1 * RADIUS;
 /// Samples between two renewals on the way: a third of a millimetre.
 const RENEWED_EVERY: usize = 33;
@@ -113,8 +113,8 @@ fn the_rim_of_a_scan_gives_way_to_the_ball() {
             after_free_motion(&scan, &from, &to).map(|mesh| nearest_to_line(&mesh, &from, &to))
         {
             println!("{y:e} m from the rim: {:.3} radii", nearest / RADIUS);
-            // of the scan there stays what reaches into the ball between two nodes of the lattice
-            // that it did not reach
+            // parts of the scan that reach into the ball between two unreached nodes of the lattice
+            // stay
             assert!(
                 nearest > RADIUS - NOISE - 2.0 * CHORD,
                 "{y:e} m from the rim: {nearest:e} m"

@@ -1,5 +1,5 @@
-//! Scans finer than the tip: where a scan has the shape that was touched, it is moved and its
-//! detail kept; elsewhere it is replaced.
+//! Scans finer than the tip: if a scan has the touched shape, it moves and keeps its detail;
+//! elsewhere the patch replaces it.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use touchup::mesh::{FaceTree, TriMesh, VertexId};
@@ -61,7 +61,7 @@ fn patched(scan: &TriMesh, sinks: f64) -> PatchedMesh {
             if line % 2 == 0 { along } else { -along },
             f64::from(line) * 0.8e-3 - 4.8e-3,
         );
-        // where the ball touches neither floor nor walls
+        // clear of floor and walls
         let inside = HOLE - 1.1 * RADIUS - x.abs().max(y.abs());
         let is_over = sinks > 0.0 && x.abs().max(y.abs()) < HOLE;
         let down = if is_over {
@@ -95,7 +95,7 @@ fn is_well_inside(p: &Point3<f64>) -> bool {
     from_middle < TOUCHED - RADIUS && from_middle > HOLE + 0.3e-3
 }
 
-/// Off the part as it was touched, m: the ball rests on the plane between the lines.
+/// Distance from the touched part, m: the ball rests on the plane between the lines.
 fn p95(mesh: &TriMesh, part: impl Fn(f64) -> f64) -> f64 {
     let used = (0..mesh.vertex_slots() as u32)
         .map(VertexId)

@@ -1,5 +1,5 @@
-//! A scan of which only a region is touched: the result equals that of the whole scan, and the rest
-//! is unchanged.
+//! Touches of a region of a scan: the result equals that of the whole scan, and the rest stays
+//! unchanged.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use touchup::haptic::Refiner;

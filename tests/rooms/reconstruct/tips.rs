@@ -94,9 +94,9 @@ fn tips() -> [(&'static str, StylusParams); 6] {
     ]
 }
 
-/// Share of the samples in contact with an estimated place, and median and 90th percentile of the
-/// distance of their points from the part, mm, and of the error of their normals, degrees, where
-/// one place alone touched.
+/// Share of the samples in contact with an estimated place, and for single contacts median and 90th
+/// percentile of the distance of their points from the part, mm, and of the error of their normals,
+/// degrees.
 fn quality(contacts: &[(TipTouch, TrueState)]) -> [f64; 5] {
     let plate = Plate::default();
     let (mut distances, mut angles, mut touching) = (Vec::new(), Vec::new(), 0);
@@ -131,9 +131,9 @@ fn quantiles(values: &mut [f64]) -> [f64; 2] {
     [0.5, 0.9].map(|share| values[(share * (values.len() - 1) as f64) as usize])
 }
 
-/// How deep the tip is in the part at most, m.
+/// Largest depth of the tip in the part, m.
 ///
-/// - `known`: contacts are compared with the tip up to this height, m.
+/// - `known`: height of the tip up to which its shape holds, m.
 fn depth(stylus: &StylusParams, known: f64, contacts: &[(TipTouch, TrueState)]) -> f64 {
     let plate = Plate::default();
     let body = TipBody::new(stylus.shape, stylus.radius).unwrap();
@@ -172,8 +172,8 @@ fn contacts_of_a_tip_are_located() {
     );
     for (name, stylus) in &tips() {
         let contacts = contacts(stylus, 1);
-        // the tip is known up to 6 mm; the simulated one goes on. The side of a cone that leans
-        // enters the rim of the boss 5 to 6 mm up, by 0.116 mm
+        // the tip model ends at 6 mm; the simulated one goes on. The side of a leaning cone enters
+        // the rim of the boss 5 to 6 mm up, by 0.116 mm
         let (known, most) = if *name == "cone of 20°, tilt 15°" {
             (5e-3, 0.12e-3)
         } else {
@@ -186,7 +186,7 @@ fn contacts_of_a_tip_are_located() {
         // noise of 0.05 mm at 500 Hz, averaged over 16 ms and more, and a tenth of the samples at
         // edges and turns
         assert!(share > 0.8 && median < 0.03 && angle_median < 3.0, "{name}");
-        // the side of a leaning cylinder on the edge of a hole is taken for its end
+        // the estimate mistakes the side of a leaning cylinder on the edge of a hole for its end
         let worst = if *name == "flat, tilt 15°" {
             2.0
         } else {

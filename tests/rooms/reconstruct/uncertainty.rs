@@ -1,6 +1,6 @@
-//! Stated uncertainty of the patched mesh against the simulator's part: where the errors are those
-//! of its model, which shows that it is consistent, and where they are not, which shows its limits;
-//! outliers, and places that move.
+//! Stated uncertainty of the patched mesh against the simulator's part: with errors of its model,
+//! which shows that it is consistent, and with others, which shows its limits; outliers, and
+//! relocated places.
 
 use std::collections::BTreeSet;
 
@@ -27,7 +27,7 @@ fn normal(rng: &mut Pcg64) -> f64 {
 }
 
 /// A plate as scanned and as touched by `stylus`, whose radius and stiffness are those of `stated`
-/// give or take what the calibration leaves.
+/// give or take the residual of the calibration.
 fn touched_plate(stated: &StylusParams, seed: u64) -> (TriMesh, Touch, PatcherParams) {
     let scan_noise = ScannerParams::default().noise;
     let params = PatcherParams::new(stated.radius, Some(stated.stiffness), scan_noise);
@@ -72,8 +72,7 @@ fn patched(patcher: &mut Patcher, scan: &TriMesh) -> PatchedMesh {
     patcher.patched(scan, &FaceTree::new(scan)).unwrap()
 }
 
-/// The area that each vertex stands for, m²: on a plane, where faces are merged, few stand for
-/// much.
+/// The area that each vertex represents, m²: on a plane, with its merged faces, few stand for much.
 fn areas(mesh: &TriMesh) -> Vec<f64> {
     let mut areas = vec![0.0; mesh.vertex_slots()];
     for (face, corners) in mesh.faces() {
@@ -134,8 +133,7 @@ impl Normalised {
     }
 }
 
-/// Consistency, not truth: noise, friction and residual calibration errors are drawn from the
-/// model.
+/// Consistency, not truth: the model supplies noise, friction and residual calibration errors.
 #[test]
 #[ignore = "a slow proof"]
 #[expect(clippy::too_many_lines)]
@@ -214,7 +212,7 @@ enum Foreign {
     Nothing,
     /// Student's t with 3 degrees of freedom: one in 25 is beyond three times its root mean square
     HeavyTails,
-    /// what is left of it after 50 ms is e⁻¹: nothing averages out in a window
+    /// e⁻¹ of it remains after 50 ms: nothing averages out in a window
     Drifting,
 }
 
@@ -312,7 +310,7 @@ fn errors_outside_of_the_model_are_not_in_the_stated_uncertainty() {
             off * 1e6,
             z.rms()
         );
-        // what merging leaves of some 5,000
+        // the rest of some 5,000 after merging
         assert!(z.all.len() > 2000, "{name}: {}", z.all.len());
         let by = |shift: f64| {
             mean(
@@ -329,8 +327,8 @@ fn errors_outside_of_the_model_are_not_in_the_stated_uncertainty() {
         "{off} {rms} {within}"
     );
 
-    // the centre is where it is: a ball stated 20 µm too small leaves the surface 20 µm too high,
-    // and the mean square of what is normalised grows by that of the shift
+    // the centre stays: a ball stated 20 µm too small leaves the surface 20 µm too high, and the
+    // mean square of the normalised error grows by that of the shift
     let small = report("radius 20 µm small", [1.48 / 1.5, 1.0], Foreign::Nothing);
     assert!((small.0 - off - 20e-6).abs() < 2e-6, "{}", small.0);
     assert!(
@@ -350,15 +348,15 @@ fn errors_outside_of_the_model_are_not_in_the_stated_uncertainty() {
     );
     assert!(stiff.2 < 0.93, "95 % are {}", stiff.2);
 
-    // the same root mean square in other forms: single outliers are averaged and rejected …
+    // the same root mean square in another form: averaging and rejection handle single outliers
     let tails = report("heavy tails", [1.0, 1.0], Foreign::HeavyTails);
     assert!(
         (0.8..=1.25).contains(&tails.1) && tails.2 > 0.93,
         "{tails:?}"
     );
-    // … and what does not average out in a window is not in the stated uncertainty: of its 50 ms a
-    // smoothing of some milliseconds leaves all of the 50 µm, and 20 times as many errors are
-    // beyond two deviations as ought to be, if this is half of the stated deviation
+    // the stated uncertainty lacks errors that do not average out in a window: of their 50 ms a
+    // smoothing of some milliseconds leaves all of the 50 µm, and 20 times as many errors as
+    // expected are beyond two deviations, if this is half of the stated deviation
     let drift = report("drifting poses", [1.0, 1.0], Foreign::Drifting);
     assert!(
         (1.5..=3.5).contains(&drift.1) && (0.5..0.85).contains(&drift.2),
@@ -366,9 +364,9 @@ fn errors_outside_of_the_model_are_not_in_the_stated_uncertainty() {
     );
 }
 
-/// What a calibration leaves does not average out: 12 µm of the radius and 16 µm of the place (20
-/// µm together), or 16 % of the 125 µm that 2.5 N bend the stylus, stand beside all else in every
-/// touched vertex.
+/// The residual of a calibration does not average out: 12 µm of the radius and 16 µm of the place
+/// (20 µm together), or 16 % of the 125 µm that 2.5 N bend the stylus, stand beside all else in
+/// every touched vertex.
 #[test]
 #[ignore = "a slow proof"]
 fn what_the_calibration_leaves_is_in_every_vertex() {
@@ -388,7 +386,7 @@ fn what_the_calibration_leaves_is_in_every_vertex() {
             .filter(|(_, support)| **support == Support::Touched);
         touched.map(|(sigma, _)| *sigma).collect::<Vec<f64>>()
     };
-    // half of them are known better: edges and corners are not
+    // half of them have a smaller uncertainty: edges and corners do not
     let median = |mut values: Vec<f64>| {
         values.sort_by(f64::total_cmp);
         values[values.len() / 2]
@@ -473,7 +471,7 @@ fn shaken_and_slipped(messages: &[Message]) -> Vec<Message> {
     messages
 }
 
-/// Where the ball was on a plane that looks up when it was disturbed.
+/// Places of the ball on an upward plane during a disturbance.
 fn disturbed_places(touch: &Touch) -> Vec<Point3<f64>> {
     let plate = Plate::default();
     let looks_up = |p: &Point3<f64>| {
@@ -550,7 +548,7 @@ fn outliers_are_counted_and_do_not_dent_the_mesh() {
         let [shaken_contacts, calm_contacts] = [1, 0].map(|i| patchers[i].outliers().rejected);
         println!("seed {seed}: {shaken_contacts} contacts rejected, {calm_contacts} when calm");
         rejected = [rejected[0] + shaken_contacts, rejected[1] + calm_contacts];
-        // of the same hand where it was disturbed and where it was not, calm and shaken
+        // of the same hand inside and outside of the disturbance, calm and shaken
         let [[calm, calm_elsewhere], [held, held_elsewhere]] = [0, 1].map(|i| {
             let apart = || {
                 patchers[i]
@@ -686,9 +684,9 @@ fn a_place_moves_when_a_second_pass_confirms_it() {
     }
 }
 
-/// A ball slides over the plane z = 0, its poses come with white noise at half of the rate of the
-/// force and are interpolated: the touched points lie about the plane as far as their stated noise.
-/// Other rates are not covered.
+/// A ball slides over the plane z = 0, with interpolated poses of white noise at half of the rate
+/// of the force: the touched points lie about the plane as far as their stated noise. The test
+/// omits other rates.
 #[test]
 fn contacts_scatter_about_the_plane_by_their_stated_noise() {
     let (radius, pose_noise) = (1.5e-3, 20e-6);
@@ -726,7 +724,7 @@ fn contacts_scatter_about_the_plane_by_their_stated_noise() {
             },
         };
         finder.push(contacts.observe(&sample).unwrap(), |touch| {
-            // the noise is known after some hundred samples
+            // the noise estimate is ready after some hundred samples
             if let Some(contact) = touch.contact.filter(|_| i > 5_000) {
                 over.push(contact.point.z / contact.sigma.noise);
             }

@@ -1,5 +1,5 @@
-//! The definition of the parameters against a table that was written by hand, and what is made of
-//! the definition against its files.
+//! The declaration of the parameters against a hand-written table, and generated files against the
+//! declaration.
 
 use std::fs;
 use std::path::Path;
@@ -147,7 +147,7 @@ refine.step - lie,corrected,bounded,dp5
 refine.along - normal0,force
 ";
 
-/// The sections, and whether they are built in the default scene.
+/// The sections, and whether the default scene builds them.
 const SECTIONS: [(&str, bool); 20] = [
     ("sync", true),
     ("columns", false),
@@ -230,7 +230,7 @@ fn each_parameter_is_declared_as_in_the_table_by_hand() {
     }
     for one in declared().iter().filter(|one| one.range.is_some()) {
         let [low, high] = one.range.unwrap();
-        // a word of what the unit is called in full
+        // a word of the unit's full name
         let known = ["length", "edges", "deviations", "scan"]
             .into_iter()
             .find(|word| one.unit.symbol.contains(word));
@@ -323,7 +323,7 @@ fn each_parameter_is_explained_and_has_its_unit_in_its_key() {
     }
 }
 
-/// `key: value` as one scene, with what else that key asks for.
+/// `key: value` as one scene, with the other keys that it requires.
 fn scene(key: &str, value: &str) -> String {
     let (section, name) = key.rsplit_once('.').unwrap();
     let speeds =

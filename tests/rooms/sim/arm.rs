@@ -1,10 +1,10 @@
-//! The simulated arm against the laws that it is made by.
+//! The simulated arm against the laws of its model.
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use touchup::probing::arm::{Arm, Command};
 use touchup::sim::{ArmErrors, ArmParams, Plate, SimArm};
 
-/// Where the top of the plate is flat for 20 mm, and how high it is, m.
+/// A place with 20 mm of flat top of the plate around it, and its height, m.
 const START: [f64; 3] = [40e-3, 8e-3, 12e-3];
 
 /// An arm without noise and bias, whose ball is `height` over the top of a plate.
@@ -25,8 +25,8 @@ fn quiet(height: f64) -> (ArmParams, Isometry3<f64>) {
     )
 }
 
-/// Pressed into the top and drawn along it, the tip is pulled back by μ times the normal force
-/// (Coulomb), and it presses with the stiffness times the penetration (Hooke).
+/// Pressing into the top and sliding along it, the tip feels μ times the normal force backwards
+/// (Coulomb), and presses with the stiffness times the penetration (Hooke).
 #[test]
 fn a_ball_that_slides_is_held_back_by_friction_and_presses_by_stiffness() {
     for friction in [0.0, 0.15, 0.4] {
@@ -69,7 +69,7 @@ fn a_ball_that_slides_is_held_back_by_friction_and_presses_by_stiffness() {
 }
 
 /// An encoder of the base that is off by δ turns the arm by δ about the axis of the base; a part
-/// that lies off by t and is turned by ω sees the ball at the inverse of that.
+/// with an offset of t and a turn of ω sees the ball at the inverse of that.
 #[test]
 fn an_arm_with_errors_is_where_they_put_it() {
     let plate = Plate::default();
@@ -113,7 +113,7 @@ fn an_arm_with_errors_is_where_they_put_it() {
         turned_about: place,
         ..ArmErrors::NONE
     };
-    // the turn about where the ball is told to be leaves the shift alone, seen in the turned axes
+    // the turn about the told place of the ball leaves the shift alone, seen in the turned axes
     let seen = place - UnitQuaternion::from_scaled_axis(-turn) * shift;
     assert!(
         (ball(displaced) - seen).norm() < 1e-12,

@@ -187,7 +187,7 @@ fn stream_has_the_stated_rates_noise_and_faults() {
         w.wrench.force - m.pose_ot.rotation.inverse() * m.force_o
     };
     let forces: Vec<_> = wrenches.iter().map(excess).collect();
-    // between successive residuals the slow bias cancels: √2 times the noise is left
+    // between successive residuals the slow bias cancels: √2 times the noise remains
     let n = 3.0 * (forces.len() - 1) as f64;
     let noise = (forces
         .windows(2)
@@ -216,7 +216,7 @@ fn ideal_stream_is_the_truth_in_order() {
     }
     for (i, p) in poses.iter().enumerate() {
         let m = &touched.moments[2 * i];
-        // the ball's centre is where a tip that bends by F/k puts it
+        // the bend F/k of the tip displaces the ball's centre
         let centre = p.pose_ot.translation.vector + m.force_o / 20e3;
         assert!((centre - m.pose_ot.translation.vector).norm() < 1e-15);
         assert_eq!(
@@ -252,7 +252,7 @@ fn ball_comes_to_rest_at_the_geometric_equilibrium() {
     // into the inner corner of the step: tread and riser
     let (x, c) = rest(mm(61.52, 20., 10.52), mm(61.45, 20., 10.48));
     assert!((x - mm(61.5, 20., 10.5)).norm() < 1e-12 && c.len() == 2);
-    // over the edge of the step: on the circle about the edge, towards where it was pushed
+    // over the edge of the step: on the circle about the edge, towards the unobstructed place
     let (edge, to) = (mm(60., 20., 12.), mm(60.9, 20., 13.1));
     let (x, c) = rest(mm(61.0, 20., 13.2), to);
     let expected = edge + (to - edge).normalize() * 1.5e-3;
@@ -343,7 +343,7 @@ fn senseless_stylus_settings_are_refused() {
         let message = error.to_string();
         assert!(message.len() < 120, "{message}");
     }
-    // 4 N bend this one by 1 m, which is allowed
+    // 4 N bend this one by 1 m, a permitted value
     touch(
         &Plate::default(),
         &standing(0.02),
@@ -423,7 +423,7 @@ fn ball_slides_over_any_mesh_from_any_side() {
         };
         let path = plan_mesh(&surface, &surface.bounds(), &view, &params).unwrap();
         let touched = touch(&surface, &path, &StylusParams::default(), 4).unwrap();
-        // beside the part, where it goes over the edge, the ball is free
+        // beside the part, beyond its edge, the ball is free
         let bounds = surface.bounds();
         let is_over = |m: &&TrueState| {
             let p = m.pose_ot.translation.vector;
@@ -447,7 +447,7 @@ fn ball_slides_over_any_mesh_from_any_side() {
                     .all(|c| surface.signed_distance(&c.point).abs() < 1e-9)
             );
         }
-        // the hand comes from where it looks from, and so does the force
+        // the hand comes from the viewpoint, and so does the force
         let towards = touched
             .moments
             .iter()
@@ -458,8 +458,8 @@ fn ball_slides_over_any_mesh_from_any_side() {
     }
 }
 
-// The ball's centre runs where the wall is a radius less the lean away: at R − (r − lean) of the
-// axis of a hole of radius R.
+// The ball's centre runs a radius less the lean away from the wall: at R − (r − lean) of the axis
+// of a hole of radius R.
 #[test]
 fn waterlines_go_around_every_hole_that_lets_the_ball_in() {
     let plate = Plate::default();
@@ -493,7 +493,7 @@ fn waterlines_go_around_every_hole_that_lets_the_ball_in() {
                 .iter()
                 .map(|p| ((p.xy() - centre).norm() - away).abs())
                 .fold(0.0, f64::max);
-            // the chords of the grid that the line was drawn on
+            // the chords of the grid that defines the line
             assert!(off < 0.06e-3, "{off}");
         }
         let turns = of_hole[0]
@@ -545,7 +545,7 @@ fn from_several_sides_the_ball_never_goes_through_the_part() {
         free.map(farthest).all(|gap| gap > hand.radius),
         "and around the part"
     );
-    // each side is pressed from
+    // the path presses each side from its own direction
     for side in sides {
         assert!(path.iter().any(|stroke| {
             stroke
@@ -582,7 +582,7 @@ fn a_ball_that_is_caught_is_taken_out_and_around_the_part() {
     let path = [
         still(vec![at(0.0, 0.0, 15.0), at(0.0, 0.0, -1.0)]),
         still(through_the_wall),
-        // not from where it is caught
+        // not from its place in the wall
         still(vec![at(0.0, 0.0, -1.0), at(0.0, 0.0, 15.0)]),
         still(below.to_vec()),
     ];

@@ -1,4 +1,4 @@
-//! Named worlds: what they draw, what is told of it, and whether the messages are as drawn.
+//! Named worlds: their draws, the told values, and the agreement of the messages with the draws.
 
 use nalgebra::{Isometry3, Matrix3, Point2, UnitQuaternion};
 
@@ -82,8 +82,7 @@ fn force_at(moments: &[TrueState], t: f64) -> f64 {
         + moments[at as usize + 1].force_o.norm() * share
 }
 
-/// By how much the stamps of the wrenches are late, s: where their forces fit best to the true
-/// ones.
+/// Delay of the stamps of the wrenches, s: their forces fit best to the true ones there.
 fn delay(moments: &[TrueState], wrenches: &[StampedWrench]) -> f64 {
     let misfit = |delay: f64| {
         rms(wrenches
@@ -203,7 +202,8 @@ fn what_is_told_errs_by_the_stated_deviations() {
             stds.tare,
             600.0,
         );
-        // where the scan is told to be, from where it is: shift and turn in the axes of the scan
+        // the told pose of the scan relative to the true one: shift and turn in the axes of the
+        // scan
         let off = |d: &DrawnWorld| d.stylus.sensor.scan_to_space.inverse() * d.told.scan_to_space;
         holds(
             "shift",
@@ -490,8 +490,7 @@ fn friction_varies_over_the_part_and_is_the_same_at_the_same_place() {
             let along = moved - contact.normal * moved.dot(&contact.normal);
             let normal = w[1].force_o.dot(&contact.normal);
             let across = (w[1].force_o - contact.normal * normal).norm();
-            // far faster than the speed below which friction is undecided, 1 mm/s: (v + 1 mm/s) / v
-            // takes that out
+            // far above the speed of undecided friction, 1 mm/s: (v + 1 mm/s) / v removes that
             (along.norm() > 20e-3).then(|| {
                 (
                     contact.point,

@@ -130,8 +130,8 @@ fn offset_of(samples: impl IntoIterator<Item = Sample>) -> Option<ClockOffset> {
     clock.offset()
 }
 
-/// Down at 50 mm/s, stopped where the force begins: worked out by hand, the delay is the shift of
-/// the stamps.
+/// Down at 50 mm/s, with a stop at the onset of the force: by hand, the delay is the shift of the
+/// stamps.
 #[test]
 fn a_clean_stop_gives_the_delay_that_was_put_in() {
     for late_ms in [-100.0, -40.0, -3.0, 0.0, 2.5, 80.0, 100.0] {
@@ -161,7 +161,7 @@ fn a_clean_stop_gives_the_delay_that_was_put_in() {
 
 #[test]
 fn where_there_is_nothing_to_see_nothing_is_found() {
-    // never in contact; always in contact; the ball comes to rest long before it is pressed; two
+    // never in contact; always in contact; the ball comes to rest long before it presses; two
     // onsets alone
     assert_eq!(offset_of((0..5000).map(|ms| sample(ms, 0.01, 0.05))), None);
     assert_eq!(
@@ -291,9 +291,9 @@ fn a_recording_with_a_hole_in_it_shows_no_drift_where_there_is_none() {
     }
 }
 
-/// Taps by a sensor too slow for the onsets: 60 ms of contact, then up and down at 50 mm/s.
+/// Taps with a sensor too slow for the onsets: 60 ms of contact, then up and down at 50 mm/s.
 ///
-/// - `period_ms`: from tap to tap; the ball is lifted by 3.5 mm at most.
+/// - `period_ms`: from tap to tap; the ball lifts by 3.5 mm at most.
 fn taps(period_ms: i64, late_ms: i64) -> Option<ClockOffset> {
     let phase = |ms: i64| ms.rem_euclid(period_ms) - 60;
     let at = |ms: i64| {

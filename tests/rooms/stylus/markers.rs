@@ -92,7 +92,7 @@ fn filtered(
     poses
 }
 
-/// Distance of two poses at the ball, and how much they are turned, rad.
+/// Distance of two poses at the ball, and their relative turn, rad.
 fn off(a: &Isometry3<f64>, b: &Isometry3<f64>) -> (f64, f64) {
     (
         (a.translation.vector - b.translation.vector).norm(),
@@ -104,7 +104,7 @@ fn gauss(rng: &mut Pcg64) -> Vector3<f64> {
     Vector3::from_fn(|_, _| StandardNormal.sample(rng))
 }
 
-/// Every choice of three to six markers gives the pose that the frame was made with.
+/// Every choice of three to six markers gives the pose of the frame.
 #[test]
 fn the_first_pose_is_exact_for_every_set_of_markers() {
     let mut rng = Pcg64::seed_from_u64(1);
@@ -200,7 +200,7 @@ fn no_spring_and_no_set_of_markers_blows_up() {
                 pose.check().unwrap();
                 let centroid = pose.pose_ot * body().centroid_t() - body().centroid_t();
                 // the stiffest take 0.2 mm of noise within 1 ms for a speed, and fly on with it for
-                // up to 30 ms; what blows up would be metres off, or no number
+                // up to 30 ms; an unstable one would be metres off, or no number
                 assert!(
                     centroid.norm() < bound,
                     "{frequency} Hz, {damping}: {centroid}"
@@ -229,7 +229,7 @@ fn few_markers_are_coasted_over_and_then_there_is_no_pose() {
         );
         states.push(filter.tracking());
     }
-    // a frame is used when the next one has come
+    // a frame counts when the next one has come
     let state_at = |ms: usize| states[ms / 5 + 1];
     assert_eq!(
         [480, 500, 515, 520].map(state_at),
@@ -340,7 +340,7 @@ fn an_outlier_within_the_gate_counts_little_and_one_beyond_it_nothing() {
     }
 }
 
-/// What a search over all labels would take for the pose: four markers where they are and two
+/// The pose that a search over all labels would pick: four markers at their places and two
 /// reflections.
 #[test]
 fn a_first_frame_with_reflections_and_a_swap_is_seen_through() {

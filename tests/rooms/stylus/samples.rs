@@ -151,8 +151,8 @@ proptest! {
     #[test]
     fn orientation_is_the_slerp_of_the_books(a in unit_quaternion(), b in unit_quaternion(), at in 1..8_i64) {
         let dot: f64 = a.iter().zip(b).map(|(x, y)| x * y).sum();
-        // where sin Ω is small the books' form has no digits; where the two rotations are equally
-        // long either is right
+        // at a small sin Ω the books' form has no digits; if the two rotations are equally long
+        // either is right
         prop_assume!(dot.abs() < 0.999 && dot.abs() > 1e-6);
         let (samples, _) = default_synchronised(&[turned_pose(0, a), turned_pose(8 * MS, b), wrench(at * MS, 0.0)]);
         let q = samples[0].pose_ot.rotation;
@@ -437,7 +437,7 @@ fn stamp_of(message: &Message) -> i64 {
     }
 }
 
-/// Where the pose is, by a search over all of them: the brute force beside the buffered one.
+/// The pose by a search over all of them: the brute force beside the buffered one.
 fn by_search(messages: &[(Message, i64)], largest_gap_ns: i64) -> Vec<(i64, f64)> {
     let mut poses = Vec::new();
     let mut expected = Vec::new();
@@ -587,7 +587,7 @@ fn axis_angle() -> impl Strategy<Value = (Vector3<f64>, f64)> {
 }
 
 proptest! {
-    /// The reading is made with matrices written by hand: f_S = R_OSᵀ(F + m g) + b, τ_S about So.
+    /// Hand-written matrices give the reading: f_S = R_OSᵀ(F + m g) + b, τ_S about So.
     #[test]
     fn compensation_gives_back_the_contact_force(
         (ot, ts) in (axis_angle(), axis_angle()),

@@ -76,8 +76,8 @@ proptest! {
     }
 }
 
-/// The first message of a stream is believed with the second; from then on the later of wrench and
-/// pose lets the sample out.
+/// The second message of a stream confirms the first; from then on the later of wrench and pose
+/// lets the sample out.
 #[test]
 fn a_sample_goes_out_with_the_later_of_its_wrench_and_the_pose_after_it() {
     let mut sync = Synchroniser::in_order(SyncParams::default()).unwrap();

@@ -66,7 +66,7 @@ proptest! {
         for vertex in (0..mesh.vertex_count() as u32).map(VertexId) {
             prop_assert_eq!(star(&mesh, vertex), star(&rebuilt, vertex));
         }
-        // a tree over what is left sees no face that was removed
+        // a tree over the remaining faces sees no removed face
         let tree = FaceTree::new(&mesh);
         if let Some(hit) = tree.closest(&mesh, &Point3::new(0.1, 0.2, 0.3), f64::INFINITY) {
             prop_assert!(mesh.has_face(hit.face));

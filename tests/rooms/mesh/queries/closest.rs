@@ -17,19 +17,19 @@ fn brute_barycentre_distance(mesh: &TriMesh, p: &Point3<f64>) -> f64 {
         .fold(f64::INFINITY, f64::min)
 }
 
-/// Error bound of a distance computed in doubles, and the face named from the nearest.
+/// Error bound of a distance computed in doubles, and of the named face against the nearest.
 ///
 /// Let M be the largest coordinate, D the diagonal of the mesh, d the distance; ε/2 is one
 /// rounding.
 ///
-/// - A point of a face, a corner and two shares of edges, is rounded twice by ε/2 · M along each
-///   axis and by ε D for the products; its distance to `p` by 5/4 ε d. So one distance is off by e
-///   = √3 ε M + ε D + 5/4 ε d. Two faces nearer to each other than 2e cannot be distinguished and
-///   count as equal, so the distance of the face named is off by that and by e for each of the two:
-///   4e < 8 ε M + 4 ε D + 5 ε d.
+/// - A point of a face, a corner and two shares of edges, has two roundings of ε/2 · M along each
+///   axis and of ε D for the products; its distance to `p` one of 5/4 ε d. So one distance is off
+///   by e = √3 ε M + ε D + 5/4 ε d. Two faces nearer to each other than 2e are indistinguishable
+///   and count as equal, so the distance of the named face is off by that and by e for each of the
+///   two: 4e < 8 ε M + 4 ε D + 5 ε d.
 /// - The shares are quotients of products of edges with `p` − corner: each moves the point along an
-///   edge by up to 9 ε (D + d), the quotient of dots of three terms. That counts in full only where
-///   d is as small, once for either face.
+///   edge by up to 9 ε (D + d), the quotient of dots of three terms. That counts in full only for a
+///   d as small, once for either face.
 /// - The brute force works relative to a corner, so M does not enter: 7 ε (D + d), from the same
 ///   products.
 /// - For each face the error of deciding inside from side: the normal of a face of quality q
@@ -50,7 +50,7 @@ fn rounding(mesh: &TriMesh, p: &Point3<f64>, distance: f64) -> f64 {
             .map(|i| (t[(i + 1) % 3] - t[i]).norm())
             .fold(0.0, f64::max);
         let height = (t[1] - t[0]).cross(&(t[2] - t[0])).norm() / longest;
-        // what p is away counts as the edge does
+        // the distance of p counts as the edge does
         let size = longest + distance;
         if longest > 0.0 {
             height.min(16.0 * f64::EPSILON * size * size / height)
@@ -264,9 +264,8 @@ fn outside(outline: &[[f64; 2]], p: &Point3<f64>) -> f64 {
     most
 }
 
-/// Points straight off every edge and corner in all directions, where two to six faces are equally
-/// near; also far from the origin and askew, where the closest point of each is rounded
-/// differently.
+/// Points straight off every edge and corner in all directions, with two to six equally near faces;
+/// also far from the origin and askew, with different roundings of the closest point of each.
 #[test]
 fn at_edges_and_corners_the_sign_separates_inside_from_outside() {
     let cube = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
@@ -305,7 +304,7 @@ fn at_edges_and_corners_the_sign_separates_inside_from_outside() {
                         };
                         let p = on_edge + point(&mut rng) * 10f64.powf(within(&mut rng, -4.0, 0.0));
                         let truth = outside(outline, &pose.inverse_transform_point(&p));
-                        // corners are rounded by 6e-11 along each axis at 1e6
+                        // rounding of corners is 6e-11 along each axis at 1e6
                         if truth.abs() < 1e-9 + 1e-15 * far {
                             continue;
                         }
@@ -412,7 +411,7 @@ fn a_query_that_is_no_point_or_finds_nothing_gives_none() {
 
 #[test]
 fn faces_at_one_place_are_all_searched() {
-    // a thousand equal faces cannot be separated by a split; the smallest id is named
+    // no split can separate a thousand equal faces; the answer is the smallest id
     let positions = vec![
         Point3::origin(),
         Point3::new(1.0, 0.0, 0.0),
@@ -431,7 +430,7 @@ fn faces_at_one_place_are_all_searched() {
     check_query(&mesh, &tree, &Point3::new(0.0, 0.0, 2.5));
 }
 
-/// Where the hint leaves no distance at all, rounding of a needle's normal must not lose its own
+/// If the hint leaves no distance at all, rounding of a needle's normal must not lose its own
 /// corner.
 #[test]
 fn a_corner_of_a_needle_is_found_from_its_own_face() {

@@ -18,8 +18,8 @@ use crate::common::{grid, within};
 
 type Triangle = [Point3<f64>; 3];
 
-/// The point of a triangle nearest to `p`: the foot on its plane where that is inside, else the
-/// nearest of the feet on its three sides. The code under test goes by Voronoi regions instead.
+/// The point of a triangle nearest to `p`: the foot on its plane if that is inside, else the
+/// nearest of the feet on its three sides. The code under test uses Voronoi regions instead.
 fn nearest(p: &Point3<f64>, t: &Triangle) -> Point3<f64> {
     let (p, t) = (p - t[0], t.map(|x| x - t[0]));
     let on_side = |a: Vector3<f64>, b: Vector3<f64>| {
@@ -70,7 +70,7 @@ enum Kind {
     Sheet,
 }
 
-/// A mesh of about a unit's size, with the generator for what follows.
+/// A mesh of about a unit's size, with a generator for later choices.
 fn unit_mesh(kind: Kind, rng: &mut Pcg64) -> TriMesh {
     match kind {
         Kind::Soup => soup(rng, |rng, a| {

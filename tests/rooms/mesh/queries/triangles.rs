@@ -76,7 +76,7 @@ mod exact {
         if hp.signum() * hq.signum() > 0 {
             return false;
         }
-        // (hp − hq) · (x − s) for the point x where the line meets the plane
+        // (hp − hq) · (x − s) for the crossing x of line and plane
         (0..3).all(|i| {
             let (s, e) = (&t[i], &t[(i + 1) % 3]);
             let (to_p, to_q) = (minus(p, s), minus(q, s));

@@ -1,4 +1,4 @@
-//! An arm's kinematics and where its touches begin.
+//! An arm's kinematics and the onset of its touches.
 
 use std::f64::consts::PI;
 
@@ -131,7 +131,8 @@ fn errors(making: &Making, params: &OnsetParams) -> [f64; 3] {
     [mean, rms, normal.sqrt()]
 }
 
-/// The bent line is made, so its corner is known. Neither speed nor braking nor delay moves it.
+/// The bent line is synthetic, so its corner is exact. Neither speed nor braking nor delay moves
+/// it.
 #[test]
 #[ignore = "a slow proof"]
 fn the_corner_is_found_whatever_the_arm_does_after_it() {
@@ -424,8 +425,7 @@ fn where_an_arm_is_stuck_it_has_no_dexterity() {
     assert!(most < 2.0, "lengths are in units of the arm: {most}");
 }
 
-/// Force that a simulated arm reports, N in B, after it was zeroed upright and then turned by 60°
-/// about x.
+/// Force that a simulated arm reports after zeroing upright and a turn by 60° about x, N in B.
 fn force_after_a_turn(configured_payload: Payload) -> Vector3<f64> {
     let payload = Payload {
         mass: 1.2,

@@ -178,8 +178,8 @@ fn an_arm_at_the_end_of_a_range_goes_round_it_or_names_the_joint() {
         joints[0] <= 2.8973 && joints[2].abs() > 0.1,
         "the third joint does what the first cannot: {joints:?}"
     );
-    // six joints have no other way: a chain whose second joint goes no farther than 10° beyond
-    // where it is
+    // six joints have no other way: a chain whose second joint goes no farther than 10° beyond its
+    // present angle
     let ur = UrGeometry::UR5E;
     let whole = ur_chain(&ur, 0.05);
     let now = Joints::from([0.3, -1.2, 1.4, -0.9, 1.1, 0.4]);

@@ -1,4 +1,4 @@
-//! A simulated arm touches a plate whose walls are known in closed form.
+//! A simulated arm touches a plate with walls in closed form.
 
 use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
 use rand::{RngExt, SeedableRng};
@@ -66,8 +66,8 @@ fn down(params: &ArmParams, place: [f64; 3]) -> TouchTarget {
     }
 }
 
-/// Where the ball is when it just touches is known: a radius above the top, a radius inside the
-/// wall of the hole.
+/// The place of a ball that just touches is exact: a radius above the top, a radius inside the wall
+/// of the hole.
 #[test]
 #[expect(clippy::too_many_lines)]
 fn the_contact_is_where_the_ball_touches_and_not_where_the_arm_rests() {
@@ -165,7 +165,7 @@ fn the_contact_is_where_the_ball_touches_and_not_where_the_arm_rests() {
         rms(&errors)
     );
     assert!((0.4..1.6).contains(&rms(&normal)), "{}", rms(&normal));
-    // the error if the place of rest were taken
+    // the error of the place of rest
     assert!(rms(&rested) > 100e-6);
 }
 
@@ -183,7 +183,7 @@ pub(super) fn explored(
     let pose = |place: &Point3<f64>| at(params, (*place).into());
     let (mut from, mut peak) = (None, 0.0f64);
     while let Some(planned) = search.next_touch() {
-        // up where it is, over, down
+        // up from its place, over, down
         let above = |place: &Point3<f64>| place + Vector3::z() * 6e-3;
         if let Some(out) = from {
             watched
@@ -264,8 +264,8 @@ fn hole_search(flag: &Point3<f64>) -> Explorer {
     .unwrap()
 }
 
-/// From a click up to 3 mm off and no size: place and diameter of both holes of the plate, which
-/// are known in closed form.
+/// From a click up to 3 mm off and no size: place and diameter of both holes of the plate, against
+/// its closed form.
 #[test]
 fn a_hole_is_found_from_one_click_and_measured() {
     let plate = Plate::default();
@@ -355,7 +355,7 @@ fn where_nothing_is_that_is_the_answer() {
     assert!(record.peak_force < 1.0);
 }
 
-/// Where a path is not free as planned, the arm stops and reports the place.
+/// If something obstructs a planned path, the arm stops and reports the place.
 #[test]
 fn an_obstacle_stops_it() {
     let (plate, params) = (Plate::default(), ArmParams::default());
@@ -386,8 +386,8 @@ fn an_obstacle_stops_it() {
     assert!(arm.time() - arm.at_rest_since() > 0.1);
 }
 
-/// However fast a link is asked for, and whether it leads to or from the part: what it meets is
-/// pressed with no more than the limit, and not pressed any more in the end.
+/// For any speed of a link, to the part or from it: the arm presses an obstacle with no more than
+/// the limit, and has left it in the end.
 #[test]
 fn a_link_that_meets_something_rigid_keeps_the_limit_of_force_and_comes_free() {
     let plate = Plate::default();
@@ -477,8 +477,8 @@ fn a_wall_beside_the_way_out_is_no_obstacle() {
     assert!((1.5..3.0).contains(&seen.0), "{} N", seen.0);
 }
 
-/// The way out of the hole leans into its wall by so little that it is felt only near the rim: what
-/// the ball has passed until the arm stands is behind it, and it goes on.
+/// The way out of the hole leans a little into its wall, so that the arm feels it only near the
+/// rim: the ball passes the rim before the arm stands, and goes on.
 #[test]
 fn a_rim_that_is_passed_while_the_arm_brakes_is_no_obstacle() {
     let (plate, params) = (Plate::default(), ArmParams::default());
@@ -570,7 +570,7 @@ fn a_force_with_the_other_sign_is_named_at_the_first_contact() {
     assert!(turned.arm.peak_force() < limits().force);
 }
 
-/// A sensor that is zeroed while something presses hides that force in every touch after it.
+/// Zeroing a sensor under load would hide that force in every later touch.
 #[test]
 fn a_sensor_that_feels_something_is_not_zeroed() {
     let (plate, params) = (Plate::default(), ArmParams::default());
@@ -763,8 +763,8 @@ fn a_force_sensor_that_does_not_sense_stops_the_arm_within_100_ms() {
     }
 }
 
-/// From its 500th state on the arm says that it moves ten times as fast, that a joint turns by
-/// itself, or that its clock was set back.
+/// From its 500th state on the arm reports a tenfold speed, a joint that turns by itself, or a
+/// clock that went back.
 #[test]
 fn an_arm_that_is_too_fast_or_whose_clock_goes_back_is_stopped() {
     let (plate, params) = (Plate::default(), ArmParams::default());
@@ -914,8 +914,7 @@ fn an_arm_that_creeps_is_not_at_rest() {
     assert!((arm.stamp_ns as f64 * 1e-9 - 2.6).abs() < 0.01);
 }
 
-/// It turns on the spot no faster than it can, and ends where it should: 0.7 rad at 0.5 rad/s take
-/// 1.4 s.
+/// It turns on the spot within its speed, and ends at the target: 0.7 rad at 0.5 rad/s take 1.4 s.
 #[test]
 fn an_arm_turns_on_the_spot_with_limited_speed() {
     let (plate, params) = (Plate::default(), ArmParams::default());
@@ -946,7 +945,7 @@ fn an_arm_turns_on_the_spot_with_limited_speed() {
     );
 }
 
-/// Pressing slides along with the force that was set: 5 N within 0.3 N over 40 mm.
+/// Pressing slides along with the set force: 5 N within 0.3 N over 40 mm.
 #[test]
 fn a_slide_keeps_its_force() {
     let (plate, params) = (Plate::default(), ArmParams::default());
@@ -975,7 +974,7 @@ fn a_slide_keeps_its_force() {
     }
     assert!(forces.len() > 1900, "{} states", forces.len());
     let mean = forces.iter().sum::<f64>() / forces.len() as f64;
-    // the sensor was zeroed by 64 readings: three deviations of their mean
+    // zeroing averages 64 readings: three deviations of their mean
     assert!(
         (mean - 5.0).abs() < 3.0 * params.force_noise / 8.0,
         "{mean}"

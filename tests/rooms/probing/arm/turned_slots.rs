@@ -65,8 +65,8 @@ impl Surface for TurnedPlate {
     }
 }
 
-/// From the middle line of the slot, whose straight wall is 3 mm beside it: the ball of 1.5 mm is
-/// stopped 1.5 mm beside that line, whatever the angle at which it comes.
+/// From the middle line of the slot, whose straight wall is 3 mm beside it: the ball of 1.5 mm
+/// stops 1.5 mm beside that line, at any angle of approach.
 #[test]
 fn a_wall_met_at_a_flat_angle_is_a_contact_at_its_place() {
     let plate = Plate::default();

@@ -60,11 +60,11 @@ fn probe(folder: &Path, change: impl Fn(String) -> String, more: &[&str]) -> Out
     touchup(&[&arguments, more].concat())
 }
 
-/// The features of the plate are known by its drawing: each is found from one click up to 3 mm off
-/// by an arm that differs from what is told of it, its numbers within 4.2 of their standard
-/// uncertainties with fewer than 40 touches each, and no force is above 1.5 times the 3 N that are
-/// set. Of 20 numbers one is beyond three in 1 of 19 such proofs, beyond 4.2 in 1 of 1900; whether
-/// errors are as large as stated 200 seeds tell (`uncertainty`).
+/// The features of the plate, against its drawing: an arm that differs from its scene finds each
+/// from one click up to 3 mm off, its numbers within 4.2 of their standard uncertainties with fewer
+/// than 40 touches each, and no force above 1.5 times the set 3 N. Of 20 numbers one is beyond
+/// three in 1 of 19 such proofs, beyond 4.2 in 1 of 1900; 200 seeds tell whether errors are as
+/// large as stated (`uncertainty`).
 #[test]
 #[ignore = "a slow proof"]
 fn the_arm_of_the_demo_finds_every_feature() {
@@ -101,7 +101,7 @@ fn the_arm_of_the_demo_finds_every_feature() {
     }
 }
 
-/// All files are there, and the recording is refined to the same mesh by another run.
+/// All files are there, and another run refines the recording to the same mesh.
 fn is_written(folder: &Path) {
     for file in [
         "plan.png",
@@ -139,7 +139,7 @@ fn is_written(folder: &Path) {
     assert!(fs::read(&again).unwrap() == fs::read(path("refined.ply")).unwrap());
 }
 
-/// The part of the demo is as round as its drawing: a hole that is probed on its triangles has the
+/// The part of the demo is as round as its drawing: a hole probed on its triangles has the
 /// drawing's diameter of 8 mm and its place within three of the reported standard deviations.
 fn errors_match_the_stated_uncertainty(folder: &Path) {
     let path = |name: &str| folder.join(name).to_str().unwrap().to_owned();
@@ -255,7 +255,7 @@ fn a_dry_run_draws_the_plan_and_moves_nothing() {
     assert!(!folder.path().join("out/recording").exists());
 }
 
-/// No controller, and no part: neither is asked for.
+/// A dry run asks for no controller and no part.
 #[test]
 fn a_dry_run_connects_to_no_arm() {
     let folder = tempfile::tempdir().unwrap();
@@ -303,7 +303,7 @@ fn a_dry_run_connects_to_no_arm() {
 }
 
 /// The part lies 2 mm below its scan, farther than the scan's noise explains: `refine` and `probe`
-/// refuse that by the same words, and what was touched is kept.
+/// refuse that with the same words, and the touches remain.
 #[test]
 #[ignore = "a slow proof"]
 #[expect(clippy::too_many_lines)]
@@ -396,8 +396,8 @@ fn what_is_surely_wrong_becomes_a_mesh_only_when_forced() {
     );
 }
 
-/// The scan has closed the slot: four of five contacts are off it. That is what an arm is sent for,
-/// and no mistake.
+/// The scan has closed the slot: four of five contacts are off it. An arm probes just such
+/// features; this is no mistake.
 #[test]
 fn what_the_scan_has_lost_is_probed_without_force() {
     let folder = tempfile::tempdir().unwrap();
@@ -423,7 +423,7 @@ fn what_the_scan_has_lost_is_probed_without_force() {
     assert!(folder.path().join("out/refined.ply").exists());
 }
 
-/// A tolerance below what a touch can be known by, and too few touches for a hole.
+/// A tolerance below the uncertainty of a touch, and too few touches for a hole.
 #[test]
 #[ignore = "a slow proof"]
 fn what_is_not_as_asked_is_named_with_its_reason_and_exit_code() {
@@ -514,7 +514,7 @@ fn what_must_not_be_is_refused_by_name() {
     }
 }
 
-/// Where the box ends above the part the probing is refused.
+/// A box that ends above the part refuses the probing.
 #[test]
 fn a_box_that_is_too_small_is_reported_and_nothing_moves() {
     let folder = tempfile::tempdir().unwrap();
@@ -561,7 +561,7 @@ fn with_arm(
     )
 }
 
-/// The simulated arm has no play, 10 µm of noise on each reading, and a stiffness that is set.
+/// The simulated arm has no play, 10 µm of noise on each reading, and a set stiffness.
 #[test]
 fn an_arm_without_play_passes_the_check() {
     let folder = tempfile::tempdir().unwrap();
@@ -609,9 +609,9 @@ const SPHERES: [&str; 8] = [
     "30,150,60,25",
 ];
 
-/// The errors are drawn by the simulator from the seed: a ball that is larger by so much, a
-/// repeatability of 0.03 mm, and no error of joints and lengths, so that the spheres are where they
-/// are told but for the scatter of touches.
+/// The simulator draws the errors from the seed: a larger ball, a repeatability of 0.03 mm, and no
+/// error of joints and lengths, so that the spheres are at their told places but for the scatter of
+/// touches.
 #[test]
 #[ignore = "a slow proof"]
 #[expect(clippy::too_many_lines)]
@@ -679,7 +679,7 @@ fn spheres_say_how_well_an_arm_repeats_and_how_large_its_ball_is_and_the_record_
         checked["passed"].as_bool().unwrap() && checked["warnings"].as_array().unwrap().is_empty()
     );
 
-    // in each result: at another temperature, and with the repeatability that was found
+    // in each result: at another temperature, and with the repeatability of the check
     let out = folder.path().join("out");
     let [scene, truth] = ["scene.yaml", "truth.ply"]
         .map(|name| folder.path().join(name).to_str().unwrap().to_owned());
@@ -803,7 +803,7 @@ fn an_arm_that_may_not_move_does_not_and_bad_spots_are_refused() {
     }
 }
 
-/// A stiffness that is wrong by a third in the scene is found: the arm has 15 N/mm.
+/// The check corrects a stiffness that is wrong by a third in the scene: the arm has 15 N/mm.
 #[test]
 fn the_stiffness_of_the_arm_is_found_and_written_into_the_scene() {
     let folder = tempfile::tempdir().unwrap();
@@ -1027,8 +1027,8 @@ fn a_tip_that_cannot_be_found_is_refused_and_nothing_is_written() {
     }
 }
 
-/// Where the wrist would come too near to a singularity an orientation is left out and listed; the
-/// others suffice.
+/// The check omits and lists an orientation whose wrist comes too near to a singularity; the others
+/// suffice.
 #[test]
 fn orientations_out_of_reach_are_left_out_and_listed() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,5 +1,5 @@
-//! A probe that is bent, a part that slips, an arm that drifts and a sensor that does while a
-//! feature is probed.
+//! A bent probe, a slipping part, a drifting arm and a drifting sensor during the probing of a
+//! feature.
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use touchup::features::FeatureKind;
@@ -16,7 +16,7 @@ const PLANE: (FeatureKind, [f64; 3]) = (FeatureKind::Plane, [45e-3, 8e-3, 12e-3]
 const SLOT: (FeatureKind, [f64; 3]) = (FeatureKind::Slot, [26e-3, 13e-3, 12e-3]);
 const BOSS: (FeatureKind, [f64; 3]) = (FeatureKind::Boss, [47.5e-3, 26e-3, 16e-3]);
 
-/// Probes features one after the other, until one is stopped.
+/// Probes features one after the other, until one stops.
 fn probed(
     wanted: &[(FeatureKind, [f64; 3])],
     seed: u64,
@@ -54,7 +54,7 @@ fn probed(
     all
 }
 
-/// Each passes by its own touches, or ends as something else, where no contact is touched again.
+/// Without a repeated contact each passes by its own touches, or ends as something else.
 #[test]
 #[expect(clippy::too_many_lines)]
 fn what_moved_while_a_feature_was_probed_is_found_by_a_contact_that_is_touched_again() {
@@ -154,7 +154,7 @@ fn an_arm_that_drifts_slowly_is_found_as_well() {
     assert!(last.ending.is_displaced(), "{}", last.ending);
 }
 
-/// Nothing moves, and the features of ten arms are found as ever.
+/// Nothing moves, and the arms find the features of all ten seeds as ever.
 #[test]
 fn contacts_of_an_arm_that_stays_are_where_they_were() {
     let mut worst: f64 = 0.0;

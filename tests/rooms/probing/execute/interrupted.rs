@@ -1,5 +1,5 @@
-//! A probing that is ended from outside: what was measured is there, the reason is told, and
-//! `--resume` goes on.
+//! A probing with an end from outside: the measured features are there, the command gives the
+//! reason, and `--resume` goes on.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -66,8 +66,8 @@ impl Case {
         self.command(out, more).output().unwrap()
     }
 
-    /// Starts a probing of [`FEATURES`], and freezes it in the middle of the second one: the first
-    /// is finished then.
+    /// Starts a probing of [`FEATURES`], and freezes it in the middle of the second one, after the
+    /// end of the first.
     fn frozen_in_second(&self, out: &str) -> Child {
         let mut child = self.command(out, &FEATURES).spawn().unwrap();
         let begun = Instant::now();
@@ -79,7 +79,7 @@ impl Case {
             sleep(Duration::from_millis(5));
         }
         signal(&child, "STOP");
-        // what it was doing when it was stopped is over once the system says so
+        // its last action is over once the system says so
         while !state_of(&child).starts_with('T') {
             assert!(begun.elapsed() < PATIENCE, "it does not stop");
             sleep(Duration::from_millis(5));
@@ -128,7 +128,7 @@ fn signal(child: &Child, name: &str) {
     assert!(sent.success());
 }
 
-/// As the system has it: R runs, S sleeps, T is stopped.
+/// State letter of the system: R runs, S sleeps, T stands.
 fn state_of(child: &Child) -> String {
     let status = fs::read_to_string(format!("/proc/{}/stat", child.id())).unwrap();
     status.rsplit(") ").next().unwrap().to_owned()
@@ -173,7 +173,7 @@ fn found_as_by(whole: &[Value], resumed: &[Value]) {
         }
         let place = |of: &Value| [0, 1].map(|axis| of["center_mm"][axis].as_f64().unwrap());
         let across = match one["axis"].as_array().filter(|_| one["kind"] == "edge") {
-            // where along an edge it was touched says nothing of it
+            // the place along an edge is arbitrary
             Some(axis) => [-axis[1].as_f64().unwrap(), axis[0].as_f64().unwrap()],
             None => [1.0, 0.0],
         };
@@ -195,7 +195,7 @@ fn a_killed_probing_keeps_each_touch_and_goes_on_with_the_rest() {
     assert!(kept.iter().filter(|touch| touch.flag == 2).count() > 0);
     recording_holds(&kept, &stamps(&out));
 
-    // nothing of it is lost by chance
+    // a rerun without `--resume` loses nothing
     let refused = case.run("out", &FEATURES);
     assert_eq!(refused.status.code(), Some(2), "{}", text(&refused.stderr));
     assert!(
@@ -401,16 +401,15 @@ fn a_payload_identification_that_is_interrupted_keeps_its_static_segments() {
     assert!(stderr.contains(&words), "{stderr}");
     assert!(!out.exists(), "nothing is concluded from a part of them");
 
-    // what is kept of a whole one is what the payload was identified from: its weight is that of
-    // 1.17 kg
+    // the complete file is the input of the identification: its weight is that of 1.17 kg
     assert_eq!(identify(&kept).output().unwrap().status.code(), Some(0));
     let all = read_static_poses(&path).unwrap();
     let forces: Vec<_> = all
         .iter()
         .map(|(r_bf, wrench)| r_bf * wrench.force)
         .collect();
-    // the bias turns with the flange, the weight does not: the mean over a cone has little of what
-    // lies across it
+    // the bias turns with the flange, the weight does not: the mean over a cone has little across
+    // it
     let mean = forces.iter().sum::<nalgebra::Vector3<f64>>() / forces.len() as f64;
     assert!(
         (mean.norm() - 1.17 * 9.81).abs() < 1.3,

@@ -1,5 +1,5 @@
-//! A hole that was touched already is open in the mesh: its flag is on the surface around it, not
-//! on a wall or floor of it.
+//! An already touched hole is open in the mesh: its flag is on the surface around it, not on a wall
+//! or floor of it.
 
 use std::sync::Arc;
 
@@ -19,7 +19,7 @@ use super::{cell, params};
 use crate::plate_stream::plate_scan;
 use crate::static_scan::StaticScan;
 
-/// The mesh that follows what the arm feels, as the node has it; it has the arm stay after some
+/// The mesh that follows the forces of the arm, as in the node; it makes the arm stay after some
 /// states.
 struct RefinedScan {
     engine: Engine,
@@ -122,8 +122,8 @@ fn diameter(probed: &FlagResult) -> Option<f64> {
     )
 }
 
-/// After 25 s in it the mesh has walls, and a floor where the ball has not been; a tap into the
-/// hole flags it there.
+/// After 25 s in it the mesh has walls, and a floor out of the ball's reach; a tap into the hole
+/// flags it there.
 #[test]
 fn a_hole_in_which_the_arm_was_stopped_is_probed_to_the_end_when_it_is_flagged_in_its_opening() {
     let (plate, cell, params) = (Plate::default(), cell(), params());
@@ -193,8 +193,8 @@ fn a_plan_for_what_is_open_begins_above_the_surface_around_it_wherever_the_flag_
     }
 }
 
-/// What is no opening lies on what is nearest to its flag: on top of the boss, 4 mm above the plate
-/// around it, and at the edge of the step.
+/// A feature without an opening lies on the surface nearest to its flag: on top of the boss, 4 mm
+/// above the plate around it, and at the edge of the step.
 #[test]
 fn flags_of_what_is_no_opening_are_on_what_is_nearest() {
     let mesh = || Plate::default().mesh(1e-5).unwrap();

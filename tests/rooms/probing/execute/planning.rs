@@ -73,7 +73,7 @@ fn a_flag_becomes_a_feature() {
     );
     // it has retracted: the ball is above the part
     assert!(end[2] > 14e-3, "{end:?}");
-    // each before it is made, and the last again with its result
+    // each before its motion, and the last again with its result
     let count = probed.touches.len();
     assert_eq!(
         world.touches,
@@ -206,7 +206,7 @@ fn a_cancelled_probing_stops_and_retracts() {
     assert!(end[2] > 14e-3, "{end:?}");
 }
 
-/// Wherever it is when it is cancelled, the retreat does not lead deeper: from 50 mm/s a stop takes
+/// At any place of its cancellation, the retreat does not lead deeper: from 50 mm/s a stop takes
 /// 2.5 mm.
 #[test]
 fn a_cancelled_probing_goes_no_deeper() {
@@ -235,7 +235,7 @@ fn a_cancelled_probing_goes_no_deeper() {
     }
 }
 
-/// From 50 mm/s a stop takes 0.1 s, and a retraction is stopped as everything else is.
+/// From 50 mm/s a stop takes 0.1 s, and it stops a retraction as everything else.
 #[test]
 fn a_probing_that_is_to_stay_stands_where_it_is() {
     for (patience, stays_after) in [
@@ -326,7 +326,7 @@ fn a_stop_of_the_arm_ends_it_with_what_was_measured() {
     assert!(!probed.touches.is_empty());
 }
 
-/// What stopped a touch belongs to it: its force, and the time until then.
+/// The stop of a touch belongs to it: its force, and the time until then.
 #[test]
 fn a_stop_keeps_the_force_and_the_time_of_the_touch_that_it_ended() {
     let hit = |arm: &mut SimArm| arm.fail_at(20.0, ArmFault::ForceSpike(40.0));
@@ -343,12 +343,11 @@ fn a_stop_keeps_the_force_and_the_time_of_the_touch_that_it_ended() {
     );
     let lose = |arm: &mut SimArm| arm.fail_at(20.0, ArmFault::LinkLost);
     let (lost, ..) = probed(&params(), &mut StaticScan::new(plate_scan(1)), lose);
-    // the sensor was zeroed in 64 readings before it began
+    // zeroing took 64 readings before it began
     assert!((lost.seconds - 20.0).abs() < 0.3, "{}", lost.seconds);
 }
 
-/// The scan lies 0.3 mm below the part, and follows as soon as the part is touched: the first touch
-/// measures the offset.
+/// The scan lies 0.3 mm below the part, and follows the first touch, which measures the offset.
 #[test]
 fn the_deviation_of_a_touch_is_from_the_mesh_before_it() {
     let (plate, cell) = (Plate::default(), cell());
@@ -442,8 +441,8 @@ impl World for Turning {
     }
 }
 
-/// A probe that leans by 50° low over the part is turned upright: its shaft stays clear of the part
-/// by its closed form, and no state turns faster than the arm can.
+/// A probe that leans by 50° low over the part turns upright: its shaft stays clear of the part by
+/// its closed form, and no state turns faster than the arm can.
 #[test]
 fn a_leaning_probe_is_turned_slowly_and_clear_of_the_part() {
     let (plate, cell) = (Plate::default(), cell());
@@ -509,7 +508,7 @@ fn a_turn_that_would_meet_a_wall_is_made_above_it() {
             );
         }
     }
-    // away from the wall it turns where it is
+    // away from the wall it turns on the spot
     let away = |share: f64| Unit::new_normalize(Vector3::new(-share, 0.0, 1.0));
     let place = upright
         .turning_place(&Point3::origin(), std::f64::consts::FRAC_PI_4, &away)
@@ -539,9 +538,9 @@ proptest! {
         let shaft_room = places.iter().map(from_shaft).fold(f64::INFINITY, f64::min) - tool.shaft_radius - tool.margin;
         let ball_room = distance(&Point3::origin(), 1.0) - tool.ball_radius - tool.margin;
         let least = shaft_room.min(ball_room);
-        // only that part of the mesh is reported
+        // reports no more than the room there
         prop_assert!(room <= least + 1e-12 || (room < 0.0 && least < 0.0), "{room} of {shaft_room} {ball_room}");
-        // and not less than half of what there is beyond the balls that model the shaft
+        // and not less than half of the room beyond the balls that model the shaft
         let spare = tool.shaft_radius * (1.25f64.sqrt() - 1.0);
         let there = (shaft_room - spare).min(ball_room);
         prop_assert!(room >= (there / 2.0).min(there).min(reach / 2.0) - 1e-12, "{room} of {there}");
@@ -610,7 +609,7 @@ fn in_reach(mesh: &TriMesh) -> TriMesh {
     TriMesh::new(mesh.positions().iter().map(|p| p * scale).collect(), kept).unwrap()
 }
 
-/// All triangles of a mesh, each in a ball, so that most are passed over.
+/// All triangles of a mesh, each in a ball, so that the search skips most.
 struct Triangles(Vec<([Point3<f64>; 3], Point3<f64>, f64)>);
 
 impl Triangles {
@@ -649,22 +648,22 @@ impl Triangles {
     }
 }
 
-/// What the moves of all plans could show.
+/// Counts of the moves of all plans.
 #[derive(Clone, Copy, Debug, Default)]
 struct Moves {
     parts: usize,
     plans: usize,
     touches: usize,
     links: usize,
-    /// with the shaft along z, so that it can be tested
+    /// with an upright shaft, which the test can check
     upright: usize,
-    /// that pass within two millimetres of what they must keep
+    /// that pass within two millimetres of the surfaces to avoid
     close: usize,
-    /// that go where the straight path from the last place in free air is barred
+    /// that go around an obstacle on the straight path from the last place in free air
     around: usize,
 }
 
-/// Ball and shaft keep their radii and the margin all along a move; `shaft`: where its direction is
+/// Ball and shaft keep their radii and the margin all along a move; `shaft`: its direction, if
 /// known.
 fn check_move(
     triangles: &Triangles,

@@ -1,5 +1,5 @@
-//! The ball slides over what touches have found, with constant force: on a plate whose distance
-//! from every place is exact.
+//! The ball slides over a touched region with constant force: on a plate with exact distances from
+//! every place.
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use touchup::features::FeatureKind;
@@ -57,7 +57,7 @@ fn probed(flag: &Flag, world: &mut dyn World) -> (FlagResult, Point3<f64>) {
     (probed, arm.ball())
 }
 
-/// The ball just touches at each station, and its normal leads away from where it does; lifted, and
+/// The ball just touches at each station, and its normal leads away from the contact; lifted, and
 /// on the whole path up, it is clear.
 fn lies_on(plate: &Plate, slide: &Slide) {
     for (number, station) in slide.stations.iter().enumerate() {
@@ -138,7 +138,7 @@ fn slides_lie_on_what_was_found_and_keep_their_force() {
     }
 }
 
-/// From a flag beside an undetected hole: only over what was touched, and into nothing.
+/// From a flag beside an undetected hole: over the touched region only, and into nothing.
 #[test]
 fn an_unknown_region_is_slid_over_where_it_was_touched() {
     let plate = Plate::default();
@@ -147,7 +147,7 @@ fn an_unknown_region_is_slid_over_where_it_was_touched() {
     let length: f64 = probed.slides.iter().map(|one| one.slide.length()).sum();
     assert!(length > 50e-3, "{length}");
     for station in probed.slides.iter().flat_map(|one| &one.slide.stations) {
-        // between two touches of different height it can only be guessed
+        // between two touches of different height the surface is a guess
         let off = plate.signed_distance(&station.centre) - BALL;
         assert!(off.abs() < BALL, "{off}");
     }
@@ -216,7 +216,7 @@ fn an_obstacle_ends_a_slide() {
         (ball.x - (42e-3 - BALL)).abs() < 0.3e-3 && ball.z > TOP + BALL + 2.5e-3,
         "{ball}"
     );
-    // 15 N/mm at 10 mm/s, until it is known, the arm has received it and is at rest
+    // 15 N/mm at 10 mm/s, until the arm has received the stop and is at rest
     assert!(peak < 10.0, "{peak}");
 }
 
@@ -276,7 +276,7 @@ fn a_cancelled_slide_comes_out_of_the_hole() {
     assert!(probed.peak_force < 4.5, "{}", probed.peak_force);
 }
 
-/// A plan has the slides too, and leaves out what is out of reach.
+/// A plan has the slides too, and omits unreachable ones.
 #[test]
 fn slides_are_planned_and_checked() {
     let (plate, cell, params) = (Plate::default(), cell(), params());

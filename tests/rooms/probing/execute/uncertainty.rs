@@ -1,5 +1,5 @@
-//! An arm that differs from what is told of it: the errors of the numbers are as large as their
-//! stated uncertainties.
+//! An arm that differs from its scene: the errors of the numbers are as large as their stated
+//! uncertainties.
 
 use std::fmt::Write as _;
 
@@ -18,14 +18,13 @@ use touchup::sim::{ArmErrorSigmas, ArmErrors, ArmParams, Plate, SimArm};
 use super::{cell, params};
 use crate::plate_stream::plate_scan;
 
-/// By what an arm differs from its scene, and what is wanted of its numbers.
+/// Error model of an arm relative to its scene, and the wanted accuracy of its numbers.
 struct World {
     name: &'static str,
     sigmas: ArmErrorSigmas,
     /// standard deviation, m
     wanted: f64,
-    /// whether directions are off by more than what walls are believed to lean by, which those of
-    /// the plate do not
+    /// whether directions deviate by more than the assumed lean of walls, unlike those of the plate
     turns: bool,
 }
 
@@ -45,14 +44,14 @@ const ROUGH: ArmErrorSigmas = ArmErrorSigmas {
 /// The middle of the plate.
 const ABOUT: Point3<f64> = Point3::new(30e-3, 25e-3, 12e-3);
 
-/// A feature of the plate by its drawing: where it is, its axis, across which directions its place
+/// A feature of the plate by its drawing: its place and axis, the directions across which its place
 /// counts, and its sizes, m.
 struct Drawn {
     name: &'static str,
     kind: FeatureKind,
     place: [f64; 3],
     axis: Vector3<f64>,
-    /// those in which its place is determined
+    /// directions that determine its place
     across: &'static [[f64; 3]],
     sizes: &'static [f64],
 }
@@ -104,8 +103,8 @@ const DRAWN: [Drawn; 5] = [
 type Normalised = (f64, f64, Vec<f64>);
 
 impl Drawn {
-    /// The numbers are in the frame of the scan, which is that of the drawing: that the part lies
-    /// elsewhere in the base than is told is an error of each place and direction.
+    /// The numbers are in the frame of the scan, which is that of the drawing: a part off its told
+    /// place in the base gives an error of each place and direction.
     fn normalised(&self, found: &Feature) -> Normalised {
         let (place, axis) = (Point3::from(self.place), self.axis);
         let off = found.centre.value - place;
@@ -135,7 +134,7 @@ impl Drawn {
     }
 }
 
-/// Told uncertainties are those that the errors are drawn from.
+/// Told uncertainties are those of the drawn errors.
 fn told(world: &World) -> ProbeParams {
     let ArmErrorSigmas {
         radius,
@@ -163,7 +162,7 @@ fn told(world: &World) -> ProbeParams {
     }
 }
 
-/// Probes a feature of the plate with an arm that differs from what is told.
+/// Probes a feature of the plate with an arm that differs from its scene.
 fn probed(drawn: &Drawn, seed: u64, scan: &TriMesh, world: &World) -> Result<Normalised, String> {
     let (plate, cell, params) = (Plate::default(), cell(), told(world));
     let errors = ArmErrors::draw(&world.sigmas, ABOUT, seed);
@@ -234,7 +233,7 @@ fn errors_are_as_large_as_stated_of_a_rough_arm() {
     errors_are_as_large_as_stated(&world, 0);
 }
 
-/// Sizes are off by what touches scatter.
+/// Sizes deviate by the scatter of touches.
 #[test]
 #[ignore = "a slow proof"]
 fn errors_are_as_large_as_stated_of_a_calibrated_arm() {
@@ -247,9 +246,9 @@ fn errors_are_as_large_as_stated_of_a_calibrated_arm() {
     errors_are_as_large_as_stated(&world, 5000);
 }
 
-/// Of 200 errors the rms over their deviation is within what is asked of 50, 0.8 to 1.25: of 50 that
-/// of a size scatters by 0.1. All are found. The errors of each feature are drawn apart, from a
-/// seed on.
+/// Of 200 errors the rms over their deviation is within the bounds for 50, 0.8 to 1.25: of 50 that
+/// of a size scatters by 0.1. The arm finds all. Each feature has errors of its own, from a seed
+/// on.
 fn errors_are_as_large_as_stated(world: &World, first: u64) {
     let (seeds, [least, most]) = (200, [0.8, 1.25]);
     let scan = plate_scan(1);
@@ -304,7 +303,7 @@ fn errors_are_as_large_as_stated(world: &World, first: u64) {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// A scan, and where the ball was at each time of the arm, in O.
+/// A scan, and the place of the ball at each time of the arm, in O.
 struct SeenPlaces {
     scan: StaticWorld,
     places: Vec<(i64, Point3<f64>)>,

@@ -1,5 +1,5 @@
-//! An arm that was stopped inside of a feature goes on from there once it is recovered, by the way
-//! that it came.
+//! A stopped arm inside of a feature goes on from there after its recovery, back along its own
+//! path.
 
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 use touchup::features::FeatureKind;
@@ -19,10 +19,10 @@ const HOLE: Flag = Flag {
     radius: 3e-3,
 };
 const TOP: f64 = 12e-3;
-/// After so many states the arm is stopped: some of them are inside of the hole.
+/// Numbers of states after which the arm stops: some of them are inside of the hole.
 const STOPS: [usize; 7] = [3000, 5000, 6011, 7222, 8433, 9644, 11055];
 
-/// The plate and its scan; the arm is to stay where it is after some states.
+/// The plate and its scan; the arm stays after `stays_after` states.
 fn stopping(stays_after: Option<usize>) -> StaticScan {
     StaticScan {
         stays_after,
@@ -39,7 +39,7 @@ fn arm(plate: &Plate) -> SimArm<'_> {
     SimArm::new(plate, ArmParams::default(), &start).unwrap()
 }
 
-/// Probes until it is stopped after some states; where the ball stands then, and the way out of
+/// Probes until the arm stops after some states; returns the place of the ball and the way out of
 /// there.
 fn stopped(arm: &mut SimArm, stays_after: usize) -> (Point3<f64>, Option<WayOut>) {
     let (cell, params, mut world) = (cell(), params(), stopping(Some(stays_after)));
@@ -125,7 +125,7 @@ fn wherever_in_a_hole_it_was_stopped_it_goes_out_by_its_way_and_probes_to_the_en
         );
         let (ending, nearest) = goes_on(&mut arm, way_out);
         assert_eq!(ending, Ending::ToleranceReached, "{stays_after}");
-        // the ball presses into the part by no more than what a touch does
+        // the ball presses into the part by no more than a touch does
         assert!(nearest > 1.5e-3 - 0.3e-3, "{stays_after}: {nearest} m");
     }
     assert!(inside >= 3, "stopped {inside} times inside of the hole");

@@ -23,15 +23,14 @@ const BALL: f64 = 3.15e-3;
 const NEAR: f64 = 4e-3;
 /// Touches within this time belong to the same pass, ns: 12 mm at 4 mm/s.
 const SAME_PASS_NS: i64 = 3_000_000_000;
-/// Two rows so far apart are not one path, ns.
+/// Gap that separates two paths, ns.
 const GAP_NS: i64 = 200_000_000;
 
-/// Each recording, and the largest share of the raw force's error that may be left.
+/// Each recording, and the largest permitted share of the raw force's error after the correction.
 ///
-/// More than half is left in zone2. A constant 0.10 N beside 0.21 N of contact explains it: a bias
+/// More than half remains in zone2. A constant 0.10 N beside 0.21 N of contact explains it: a bias
 /// of the sensor, which the stream never shows in free air. The mean force of passes to and fro,
-/// which has no friction, is as wrong there (22°), and with that constant taken out 5° are left of
-/// 20°.
+/// which has no friction, is as wrong there (22°), and without that constant 5° remain of 20°.
 const FILES: [(&str, f64); 6] = [
     ("KidneyZ1-21Oct.csv", 0.5),
     ("KidneyZ2-21Oct.csv", 0.5),

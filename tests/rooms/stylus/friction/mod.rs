@@ -134,7 +134,7 @@ fn stream(shape: Shape, friction: f64, pose_noise: f64, seed: u64) -> Stream {
 }
 
 impl Stream {
-    /// The true normal at a time, where the ball slides faster than 10 mm/s.
+    /// The true normal at a time at which the ball slides faster than 10 mm/s.
     fn truth(&self, shape: Shape, stamp_ns: i64) -> Option<Vector3<f64>> {
         let at = usize::try_from((stamp_ns - self.start_ns + 500_000) / 1_000_000).ok()?;
         let centre = |at: usize| {
@@ -148,8 +148,8 @@ impl Stream {
 }
 
 impl Stream {
-    /// Median of what friction really was, force along over force across: in the simulator it rises
-    /// with the speed.
+    /// Median of the true friction, force along over force across: in the simulator it rises with
+    /// the speed.
     fn true_friction(&self) -> f64 {
         let of = |moment: &TrueState| {
             let normal = moment.contacts.first()?.normal;
