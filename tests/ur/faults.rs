@@ -1,5 +1,5 @@
-//! What goes wrong in mid-move: the arm comes to rest, the reported reason is the true one, and it
-//! recovers on command.
+//! Faults in mid-move: the arm comes to rest, the reported reason is the true one, and it recovers
+//! on command.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -38,7 +38,7 @@ fn without_commands_the_arm_stops() {
             "the caller is silent: stop requested after {:.0} ms",
             after * 1e3
         );
-        // to the nanosecond: a difference of two times is rounded
+        // to the nanosecond: a difference of two times is inexact
         let after_ns = (after * 1e9).round();
         assert!((20e6..50e6).contains(&after_ns), "{after_ns}");
         stand_in.stands_in("stop requested with 2", 20e-3 / 2.0 + LATENCY);
@@ -49,7 +49,7 @@ fn without_commands_the_arm_stops() {
     });
 }
 
-/// What happens when the program that owns the arm goes: its client sees the pipe end.
+/// The program that owns the arm ends: its client sees the pipe end.
 #[test]
 fn a_released_arm_stops() {
     with_library(|packages| {
@@ -97,7 +97,7 @@ fn go_for(arm: &mut UrArm, seconds: f64, command: &Command) {
 /// Whether an error names the true cause.
 type IsTrue = fn(&ProbeError) -> bool;
 
-/// Moves up until it is broken off, and makes something happen meanwhile.
+/// Moves up until a fault breaks the motion off, and makes something happen meanwhile.
 fn broken_off(arm: &mut UrArm, mut happen: impl FnMut()) -> ProbeError {
     let [x, y] = PLACE;
     let from = arm.next_state().unwrap().pose_bt.translation.z;
@@ -121,7 +121,7 @@ fn broken_off(arm: &mut UrArm, mut happen: impl FnMut()) -> ProbeError {
         &TouchParams::default(),
         limits().force,
     );
-    // one that goes on takes what it passes for its end
+    // an arm that goes on passes the end of the motion
     went.and_then(|()| watched.dwell("standing", 1.0, &mut |_| {}))
         .err()
         .unwrap()
@@ -143,7 +143,7 @@ fn is_dropped(error: &ProbeError, says: &str) -> bool {
     matches!(error, ProbeError::Arm { error: ArmError::Dropped { what }, .. } if what.contains(says))
 }
 
-/// Which of them is seen first is chance.
+/// Which of them the client sees first is chance.
 fn is_dropped_somewhere(error: &ProbeError) -> bool {
     is_dropped(error, "")
 }
@@ -170,10 +170,10 @@ fn has_ended(error: &ProbeError) -> bool {
     )
 }
 
-/// Whose time passes until a fault is noticed.
+/// The clock that runs until the detection of a fault.
 #[derive(Clone, Copy)]
 enum Passes {
-    /// none: it is seen at once
+    /// none: detection is immediate
     Nothing,
     /// that of the controller, ms
     Controller(u32),
@@ -184,13 +184,13 @@ enum Passes {
     GuardAlone,
 }
 
-/// What stops the arm, by the record.
+/// Stop of the arm, by the record.
 #[derive(Clone, Copy)]
 enum By {
     Dashboard,
     Watchdog,
     Controller,
-    /// its program is paused, and ended then
+    /// its program pauses, and then ends
     Pause,
     Client,
 }
@@ -427,9 +427,9 @@ fn one_fault(packages: &Path, fault: &Fault) -> Result<(), ProbeError> {
     Ok(())
 }
 
-/// The thread of the motion still has its velocity when the program is resumed, as by the automatic
-/// reset of a safeguard. With a dashboard its program is gone by then; without one the client
-/// brakes it as soon as it is resumed, and its watchdog ends it.
+/// The thread of the motion still has its velocity when the program resumes, as by the automatic
+/// reset of a safeguard. With a dashboard its program has ended by then; without one the client
+/// brakes it at the resumption, and its watchdog ends it.
 #[test]
 #[ignore = "a slow proof"]
 fn an_arm_that_was_paused_does_not_go_on_when_it_is_resumed() {
@@ -486,7 +486,7 @@ fn an_arm_that_was_paused_does_not_go_on_when_it_is_resumed() {
     }
 }
 
-/// Lets the time of a guard pass until it is dropped.
+/// Lets the time of a guard pass until its drop.
 struct Passing {
     is_over: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
@@ -606,7 +606,7 @@ fn after_a_protective_stop_it_is_recovered() {
             !moved(stand_in.record_between("mark recovering", "mark recovered")),
             "recovery moves nothing"
         );
-        // tool, payload and watchdog are set again: it touches as it did before
+        // tool, payload and watchdog have their values again: it touches as before
         let record = touched(&mut arm, &above(5e-3))?;
         assert!(
             matches!(record.outcome, TouchOutcome::Contact { .. }),
@@ -617,8 +617,8 @@ fn after_a_protective_stop_it_is_recovered() {
     });
 }
 
-/// `touchup recover`: the program that drove it has ended, and a new one is refused until somebody
-/// says that he has looked.
+/// `touchup recover`: the program that drove it has ended, and the controller refuses a new one
+/// until somebody says that he has looked.
 #[test]
 fn a_stopped_arm_is_recovered_by_a_verb_and_nothing_moves() {
     with_library(|packages| {
@@ -692,8 +692,8 @@ fn after_a_lost_client_it_is_recovered() {
 }
 
 /// The client lives, the program of the controller does not: by a hand at the panel, or by the
-/// watchdog while nothing arrived. The restarted program executes what the registers hold: a
-/// velocity from before the fault, unless they are cleared.
+/// watchdog after a silence. The restarted program executes the contents of the registers: a
+/// velocity from before the fault, unless something clears them.
 #[test]
 fn after_an_ended_program_it_is_recovered() {
     with_library(|packages| {
@@ -725,7 +725,7 @@ fn after_an_ended_program_it_is_recovered() {
     });
 }
 
-/// A second client is refused, and the first one's motion goes on.
+/// The controller refuses a second client, and the first one's motion goes on.
 #[test]
 fn a_second_client_is_refused_and_disturbs_nothing() {
     with_library(|packages| {

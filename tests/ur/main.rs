@@ -1,10 +1,10 @@
 //! The real ur-rtde client against a stand-in for the controller: the library, the child process,
 //! the wire and the arm behind it.
 //!
-//! Whether the arm is at rest is read in the record of the stand-in, by its own clock. That waits
-//! for the client, and so do the deadlines of client and guard: how busy this machine is changes
-//! nothing. When a fault is noticed is a test of the guard and of the driver (`src/ur`), on clocks
-//! that are moved by hand.
+//! The record of the stand-in shows whether the arm is at rest, by its own clock. That waits for
+//! the client, and so do the deadlines of client and guard: the load of this machine changes
+//! nothing. Tests of the guard and of the driver (`src/ur`) check the time of detection, on clocks
+//! that they move by hand.
 
 mod faults;
 mod motion;
@@ -35,7 +35,7 @@ const TOP: f64 = 12e-3;
 /// A place with nothing but the flat top below, m in O.
 const PLACE: [f64; 2] = [45e-3, 8e-3];
 
-/// The tip upright at a place of O, in B; where the part of the stand-in lies, and its ball.
+/// The tip upright at a place of O, in B; O is the frame of the stand-in's part.
 fn at(place: [f64; 3]) -> Isometry3<f64> {
     let place = ArmParams::default().pose_bo * Point3::from(place);
     Isometry3::from_parts(place.coords.into(), UnitQuaternion::identity())
@@ -71,7 +71,7 @@ fn above(height: f64) -> TouchTarget {
     }
 }
 
-/// Runs with ur-rtde, or reports that this test was skipped.
+/// Runs with ur-rtde, or reports this test as skipped.
 fn with_library(body: impl FnOnce(&Path) -> Result<(), ProbeError>) {
     match packages() {
         Ok(packages) => body(packages).unwrap(),

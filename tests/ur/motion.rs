@@ -11,7 +11,7 @@ use touchup::sim::ArmParams;
 use crate::stand_in::{StandIn, limits};
 use crate::{LATENCY, PLACE, TOP, at, with_library};
 
-/// A line turns the tip while it moves, and ends where and how it was commanded.
+/// A line turns the tip during its motion, and ends in the commanded pose.
 #[test]
 fn a_line_ends_at_its_place_and_turn() {
     with_library(|packages| {
@@ -159,7 +159,7 @@ fn a_slide_keeps_its_force() {
             forces.len()
         );
         assert!((mean - 5.0).abs() < 0.1 && worst < 0.3, "{mean} {worst}");
-        // neither the feed nor the force goes on, whatever is commanded after it
+        // neither the feed nor the force goes on, whatever command follows
         stand_in.stands_in("mark over", 10e-3 / 1.0 + 2.0 * LATENCY);
         Ok(())
     });

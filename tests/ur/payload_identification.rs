@@ -1,4 +1,4 @@
-//! `touchup calibrate payload --robot ur`: what hangs on the flange, through the real client.
+//! `touchup calibrate payload --robot ur`: the payload on the flange, through the real client.
 
 use std::fs;
 use std::process::Command;
@@ -9,7 +9,7 @@ use super::probing::cell;
 use super::stand_in::StandIn;
 use super::with_library;
 
-/// 1.17 kg off the axis, where the scene says 0.25 kg: the controller takes off the configured
+/// 1.17 kg off the axis, against 0.25 kg in the scene: the controller subtracts the configured
 /// payload, and the sensor has all of it.
 #[test]
 #[ignore = "a slow proof"]

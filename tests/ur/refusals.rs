@@ -70,7 +70,7 @@ fn what_cannot_be_is_refused_before_it_moves() {
     });
 }
 
-/// Faults at the start are reported at once, by name.
+/// A start reports faults at once, by name.
 #[test]
 fn a_wrong_controller_or_library_is_refused() {
     with_library(|packages| {

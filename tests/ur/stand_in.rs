@@ -63,7 +63,7 @@ pub struct Line {
     pub turn: f64,
     /// of the part on the tip, N
     pub force: f64,
-    /// what happened
+    /// name of the event
     pub event: String,
 }
 
@@ -243,7 +243,7 @@ fn position(record: &[Line], event: &str) -> Option<usize> {
 
 impl Drop for StandIn {
     fn drop(&mut self) {
-        // it may have been killed by its test
+        // its test may have killed it
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
@@ -263,7 +263,7 @@ fn free_address() -> String {
     panic!("no loopback address has the ports of a controller free");
 }
 
-/// Around the plate of the stand-in; all else as it is shipped.
+/// Around the plate of the stand-in; all else as shipped.
 pub fn limits() -> Limits {
     Limits {
         lowest: Point3::new(-0.6, -0.3, 0.0),

@@ -102,7 +102,7 @@ fn a_flagged_hole_is_probed_and_shown() {
             Publication::ProbeResult(result) => Some((result.code, result.touch_count as usize)),
             _ => None,
         });
-    // of the dry run and of what was measured, as in the answers
+    // results of the dry run and of the probing, as in the answers
     assert_eq!(
         results.collect::<Vec<_>>(),
         [(planned.code, 0), (result.code, touches.len())]
@@ -327,7 +327,7 @@ fn a_paused_arm_moves_again_and_one_that_may_not_move_needs_a_start() {
     );
     assert_eq!(code(), ProbeResult::MOTION_NOT_ALLOWED);
     cell.end();
-    // one that was started so
+    // a node started with `allow_motion` off
     let cell = Cell::start(false);
     let set =
         |reply| Arrival::SetParameter("allow_motion".to_owned(), ParameterValue::Bool(true), reply);
@@ -394,7 +394,7 @@ fn a_stop_stands_until_it_is_recovered() {
     cell.end();
 }
 
-/// A simulated arm whose safety system says what the test sets.
+/// A simulated arm whose safety system has the state that the test sets.
 struct Stopping {
     arm: SimulatedArm,
     said: Receiver<(Safety, SyncSender<()>)>,

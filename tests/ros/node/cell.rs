@@ -27,7 +27,7 @@ use touchup::sim::{ArmParams, Plate, SimArm};
 use super::samples::bench::join;
 use crate::plate_stream::plate_scan;
 
-/// Nothing takes so long: what has not come by then hangs.
+/// Limit of any wait: a node that needs longer hangs.
 pub const HUNG: Duration = Duration::from_secs(120);
 /// Samples that wait for the node at most: an arm in lock step is not ahead of it by more.
 const FEW: usize = 8;
@@ -160,10 +160,10 @@ impl Cell {
             .result
     }
 
-    /// Sends a goal, and does something at its third touch, while the arm waits for that; how it
-    /// ended.
+    /// Sends a goal, and does something at its third touch, while the arm waits for that; returns
+    /// its end.
     ///
-    /// - `at_third`: gets what cancels the goal
+    /// - `at_third`: gets the flag that cancels the goal
     pub fn goal(
         &self,
         ids: &[u32],
@@ -224,7 +224,7 @@ impl Cell {
     }
 }
 
-/// What an arm feels is lost where the node is too slow, as on a network.
+/// Samples of an arm; a slow node loses them, as on a network.
 pub struct Lossy {
     pub world: OtherParticipants,
     pub clock: Clock,
@@ -241,7 +241,7 @@ impl SamplePort for Lossy {
     }
 }
 
-/// What is asked of the thread of an arm, and where the answer goes.
+/// A request to the thread of an arm, with the channel of its answer.
 enum Asked {
     State(SyncSender<Result<ArmState, ArmError>>),
     Command(Command, SyncSender<Result<(), ArmError>>),

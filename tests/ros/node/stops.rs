@@ -1,8 +1,8 @@
-//! The table of stops in docs/ros.md, line by line: whatever the node is busy with, a stop reaches
-//! a moving arm within one of its periods.
+//! The table of stops in docs/ros.md, line by line: during any work of the node, a stop reaches a
+//! moving arm within one of its periods.
 //!
-//! In all of them the thread of the samples takes nothing, and no sample more finds room, when the
-//! arm is asked to stop.
+//! In all of them the thread of the samples takes nothing, and its full queue refuses samples, at
+//! the time of the stop.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
@@ -24,21 +24,21 @@ use touchup::stylus::{Message, StampedPose};
 use super::cell::{Cell, HUNG, Lossy, SimulatedArm};
 use super::samples::bench::in_frame;
 
-/// States over which the speed is measured.
+/// Number of states of a measured speed.
 const SPAN: usize = 10;
 /// From a command to the motion, s, and from one state to the next.
 const LATENCY: f64 = 6e-3;
 const PERIOD: f64 = 2e-3;
 /// With which the arm brakes, m/s²: `fault_stop_mm_per_s2` of the scene.
 const BRAKES: f64 = 5.0;
-/// A search has come so far, m, that the arm comes to this speed on the way back, m/s.
+/// Least way of a search, m, after which the arm reaches this speed on the way back, m/s.
 const DEEP: f64 = 1e-3;
 const BACK: f64 = 5e-3;
 /// Six times the noise of a place, m.
 const NOISE: f64 = 60e-6;
 
-/// An event, as others in the graph, or a signal, bring it about; whether it was answered at once,
-/// where it has an answer.
+/// An event from others in the graph, or a signal; returns whether its answer came at once, true
+/// for one without an answer.
 type Event = fn(&OtherParticipants, &AtomicBool) -> bool;
 
 fn pause(world: &OtherParticipants, _: &AtomicBool) -> bool {
@@ -69,7 +69,7 @@ fn cancel(_: &OtherParticipants, is_cancelled: &AtomicBool) -> bool {
     true
 }
 
-/// What was seen of the arm, and what it was told, in order.
+/// States of the arm and its commands, in order.
 #[derive(Clone, Copy)]
 enum Note {
     /// the place of the ball in B, m
@@ -81,7 +81,7 @@ enum Note {
 /// When something happens.
 #[derive(Clone, Copy)]
 enum When {
-    /// the ball is on its way to the surface, off the place where that began
+    /// the ball is on its way to the surface, off the start of the search
     Searching,
     /// it is on its way back
     Retracting,
@@ -89,7 +89,7 @@ enum When {
 
 type Happens = Box<dyn FnOnce() + Send>;
 
-/// A simulated arm that writes down what it is told; in the midst of its motions something happens.
+/// A simulated arm that notes its commands; in the midst of its motions something happens.
 struct NotedArm {
     arm: SimulatedArm,
     notes: Arc<Mutex<Vec<Note>>>,
@@ -145,7 +145,7 @@ fn place(note: &Note) -> Option<Vector3<f64>> {
 }
 
 impl Arm for NotedArm {
-    /// What happens does so after the state was measured, and before the node has it.
+    /// The event comes after the measurement of the state, and before the node has it.
     fn next_state(&mut self) -> Result<ArmState, ArmError> {
         let state = self.arm.next_state()?;
         self.notes
@@ -181,7 +181,7 @@ impl Arm for NotedArm {
     }
 }
 
-/// Keeps the thread of the samples busy until the sender is used or dropped, and fills the queue of
+/// Keeps the thread of the samples busy until the sender sends or drops, and fills the queue of
 /// samples.
 fn block(world: &OtherParticipants, clock: &Clock) -> SyncSender<()> {
     let (release, released): (_, Receiver<()>) = sync_channel(1);
@@ -202,7 +202,7 @@ fn block(world: &OtherParticipants, clock: &Clock) -> SyncSender<()> {
     release
 }
 
-/// How a goal ended during which something happened, and what the arm did.
+/// The end of a goal with an event, and the notes of the arm.
 struct Ended {
     cell: Cell,
     end: GoalEnd,
@@ -263,7 +263,7 @@ fn probe_with(events: &[Event]) -> Ended {
 }
 
 impl Ended {
-    /// What is noted from the event of this number on.
+    /// Notes after the event of this number.
     fn since(&self, event: usize) -> &[Note] {
         let mut events = self
             .notes
@@ -274,8 +274,8 @@ impl Ended {
         &self.notes[at + 1..]
     }
 
-    /// The arm is told to stop before it has given another state, and goes no farther than it needs
-    /// to brake.
+    /// The arm receives the stop before it gives another state, and goes no farther than braking
+    /// needs.
     fn assert_it_stops(&self, event: usize) {
         let since = self.since(event);
         let first = since
@@ -288,7 +288,7 @@ impl Ended {
         let before = &self.notes[..self.notes.len() - since.len()];
         let places: Vec<_> = before.iter().rev().filter_map(place).take(SPAN).collect();
         let went = (places[0] - places[SPAN - 1]) / (PERIOD * (SPAN - 1) as f64);
-        // the speed is measured with the noise of two places
+        // the noise of two places enters the speed
         let speed = went.norm() + 2.0 * NOISE / (PERIOD * SPAN as f64);
         let braking = speed * (LATENCY + 2.0 * PERIOD) + speed * speed / (2.0 * BRAKES) + NOISE;
         let along = |place: Vector3<f64>| (place - places[0]).dot(&went.normalize());

@@ -1,5 +1,5 @@
-//! Taking one touch out and putting it back, beside what `touchup refine` makes of a recording
-//! without its samples.
+//! Taking one touch out and putting it back, beside `touchup refine` on a recording without its
+//! samples.
 
 use std::path::Path;
 
@@ -14,7 +14,7 @@ use super::samples::bench::{Bench, Plate, read, refine};
 
 const FILES: [&str; 3] = ["refined.ply", "features.json", "touches.csv"];
 
-/// Where the ball was at a share of the messages, for the touch that is nearest to it.
+/// A request for the touch nearest to the ball at a share of the messages.
 fn near(plate: &Plate, share: f64) -> TakeOutTouchRequest {
     let from = (plate.messages.len() as f64 * share) as usize;
     let there = plate.messages[from..]
@@ -43,7 +43,7 @@ fn call(bench: &Bench, request: TakeOutTouchRequest) -> TakeOutTouchResponse {
     bench.call(|reply| Call::TakeOut(request, reply))
 }
 
-/// The same, and it has to be done.
+/// The same with a successful answer.
 fn done(bench: &Bench, request: TakeOutTouchRequest) -> TakeOutTouchResponse {
     let answer = call(bench, request);
     assert!(answer.success, "{}", answer.message);
@@ -67,7 +67,7 @@ fn without(messages: &[Message], touch: &TakeOutTouchResponse) -> Vec<Message> {
     messages.iter().filter(is_left).copied().collect()
 }
 
-/// What `touchup refine` makes of messages, in the order of [`FILES`].
+/// Results of `touchup refine` on messages, in the order of [`FILES`].
 fn refined(plate: &Plate, messages: &[Message]) -> [Vec<u8>; 3] {
     plate.record("left.mcap", messages);
     let folder = plate.path("refined");
@@ -101,7 +101,7 @@ fn files_of(folder: &Path) -> [Vec<u8>; 3] {
     FILES.map(|name| read(folder, name))
 }
 
-/// Samples come while it is taken out, and are in the result as well.
+/// Samples arrive during the removal, and are in the result as well.
 #[test]
 fn a_touch_that_is_taken_out_is_as_if_it_had_never_been() {
     let plate = Plate::touched_last(0.1);
@@ -256,8 +256,7 @@ fn what_is_put_back_is_as_if_it_had_never_been_out_also_beside_strokes_that_are_
         "all are in again"
     );
 
-    // one more is taken out beside one that is undone; what is left of both is in the session's
-    // record
+    // one more removal beside an undone one; the session's record has the rest of both
     assert!(undo(&bench).success);
     done(&bench, second.clone());
     let (end, _) = bench.end();

@@ -1,5 +1,5 @@
-//! What the node says of itself is so: of samples that it does not use, of single stamps, of the
-//! mesh that it shows.
+//! Reports of the node agree with the facts: on samples that it does not use, on single stamps, on
+//! the mesh that it shows.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -39,7 +39,7 @@ fn message_in(arrival: &mut Arrival) -> &mut Message {
     }
 }
 
-/// What becomes of a message on its way to the node.
+/// Change of a message on its way to the node.
 type Fault = fn(&Bench, &Message) -> Arrival;
 
 fn empty_frame(mut arrival: Arrival) -> Arrival {
@@ -142,8 +142,8 @@ const FAULTS: [(&str, Fault, &[&str]); 10] = [
     ),
 ];
 
-/// Each way in which two streams come at full rate and no sample is of use, with what the node has
-/// to say of it.
+/// Each way in which two streams come at full rate without a usable sample, with the words of the
+/// node's report.
 #[test]
 #[ignore = "a slow proof"]
 fn a_stream_that_is_not_used_is_a_warning_with_its_cause() {
@@ -185,7 +185,7 @@ fn a_stream_that_is_not_used_is_a_warning_with_its_cause() {
     );
 }
 
-/// Samples are taken, and what they say of the part cannot be.
+/// The node takes samples that contradict the part.
 #[test]
 #[ignore = "a slow proof"]
 fn an_input_that_is_surely_wrong_is_an_error_with_its_cause() {
@@ -300,7 +300,7 @@ fn a_wrong_stamp_costs_itself_alone() {
     }
 }
 
-/// Vertices by their places and faces by theirs: what does not depend on how either are numbered.
+/// A mesh independent of numbering: vertices sorted by their places and faces by theirs.
 fn in_order(vertices: &BTreeMap<u32, [f32; 3]>, faces: impl Iterator<Item = [u32; 3]>) -> TriMesh {
     let mut places: Vec<[u32; 3]> = vertices
         .values()
@@ -330,9 +330,9 @@ fn written(mesh: &TriMesh, path: &Path) -> Vec<u8> {
     std::fs::read(path).unwrap()
 }
 
-/// One of ten patches is lost while the stream comes; after it has rested for some seconds the mesh
-/// of the follower and the mesh in the file have the same bytes, and the answer of the service
-/// names the version that the follower has.
+/// The follower loses one of ten patches of the stream; after some seconds of rest its mesh and the
+/// mesh in the file have the same bytes, and the answer of the service names the version of the
+/// follower.
 #[test]
 #[ignore = "a slow proof"]
 #[expect(clippy::too_many_lines)]
@@ -401,7 +401,7 @@ fn what_is_shown_becomes_what_is_saved_at_a_follower_that_loses_patches() {
         follower.version
     );
     assert!(lost > 10);
-    // and the samples that come after it are taken as if nothing had been settled
+    // and later samples count as if the mesh had never settled
     let (end, published) = bench.end();
     assert!(read(&end.folder, "refined.ply") == plate.refined("touch.mcap"));
     let tip = published

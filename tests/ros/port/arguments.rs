@@ -1,4 +1,4 @@
-//! What the node makes of `--ros-args`: cases written by hand from the documentation of ROS 2.
+//! The node's reading of `--ros-args`: hand-written cases from the documentation of ROS 2.
 
 use std::io::Write;
 

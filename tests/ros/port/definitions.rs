@@ -1,4 +1,4 @@
-//! What `generate/` makes of the files that define messages. The expected text is written by hand.
+//! Output of `generate/` from files of message definitions. The expected text is hand-written.
 
 #[path = "../../../crates/touchup-node/generate/definition.rs"]
 mod definition;

@@ -1,4 +1,4 @@
-//! Every message against what rosbags makes of the same fields, both ways. rosbags reads the files
+//! Every message against rosbags' encoding of the same fields, both ways. rosbags reads the files
 //! of `msg/` and has the definitions of ROS 2's own packages; it shares no code with us.
 
 use std::collections::BTreeSet;
@@ -19,8 +19,7 @@ fn bytes(hexadecimal: &str) -> Vec<u8> {
         .collect()
 }
 
-/// Bytes, fields, and the message are the same thing three times; cut off anywhere, the bytes are
-/// refused.
+/// Bytes, fields, and the message agree; any shorter piece of the bytes is an error.
 fn check<M: RosMessage>(golden: &Map<String, Value>) -> &'static str {
     let entry = &golden[M::TYPE_NAME];
     let (wire, fields) = (bytes(entry["cdr"].as_str().unwrap()), &entry["fields"]);

@@ -16,7 +16,7 @@ fn read(file: &str) -> String {
     fs::read_to_string(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).join(file)).unwrap()
 }
 
-/// A row of the table as docs/ros.md has it: name, type, default, range, live, what.
+/// A row of the table in docs/ros.md: name, type, default, range, live, meaning.
 fn row(declared: &ParameterDescriptor) -> [String; 6] {
     let range = match declared.allowed {
         ParameterDomain::Double(_, from, to) => format!("{from} to {to}"),
@@ -65,7 +65,7 @@ fn the_table_is_that_of_the_documentation() {
     let declared = PARAMETERS
         .iter()
         .filter(|declared| declared.name != EVERYWHERE);
-    // "a file", "a folder" and "a type" say what a word means, not what it may be
+    // "a file", "a folder" and "a type" give the meaning of a word, not its range
     let documented = documented().into_iter().map(|mut row| {
         row[3] = row[3]
             .replace("a file", "")

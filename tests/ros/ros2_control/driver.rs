@@ -109,8 +109,8 @@ fn a_hole_is_probed_as_by_the_simulated_arm_itself() {
     }
 }
 
-/// 36 mm/s for 400 ms from rest with 0.5 m/s²: 36 (0.4 − 0.072/2) = 13.1 mm, less what the arm is
-/// late by.
+/// 36 mm/s for 400 ms from rest with 0.5 m/s²: 36 (0.4 − 0.072/2) = 13.1 mm, less the delay of the
+/// arm.
 #[test]
 fn a_velocity_is_gone_with_and_a_stop_ends_it() {
     let mut bench = bench(seven());
@@ -130,7 +130,7 @@ fn a_velocity_is_gone_with_and_a_stop_ends_it() {
 }
 
 /// It loses one period of 2 ms at each order, which come each 8 ms: slower, but it moves, and a
-/// line ends where it is to.
+/// line ends at its target.
 #[test]
 fn a_controller_that_repeats_its_set_point_at_each_order_is_slower_and_still_moves() {
     let mut bench = bench(seven());
@@ -169,12 +169,12 @@ fn a_line_ends_where_it_is_to_with_its_turn() {
         off.norm() < 60e-6 && state.pose_bt.rotation.angle_to(&to.rotation) < 1e-3,
         "{off}"
     );
-    // what is reported is where the ball is, but for the noise of the encoders
+    // the reported place is that of the ball, but for the noise of the encoders
     let ball = seven().pose_bo * bench.world().arm.ball();
     assert!((state.pose_bt.translation.vector - ball.coords).norm() < 60e-6);
 }
 
-/// On the top of the plate: the sensor feels what is ordered, and its noise averages out.
+/// On the top of the plate: the sensor measures the ordered force, and its noise averages out.
 #[test]
 fn a_press_comes_to_its_force_and_does_not_swing() {
     let simulated = seven();

@@ -12,8 +12,8 @@ use super::{Bench, Fault, STOP, bench, seven, sideways};
 const ENDS_BY_ITSELF_MS: f64 = 10.0 + 60.0 + 18.0 + 7.0;
 /// A silence, or a lateness, that is a fault.
 const SILENT_MS: f64 = 60.0;
-/// The least time for a change of velocity is 10 ms, sent anew with each state: what is left falls
-/// by e in that time, by 36 in 36 ms.
+/// The least time for a change of velocity is 10 ms, counted anew from each state: the rest of the
+/// velocity falls by e in that time, by 36 in 36 ms.
 const BRAKED_MS: f64 = 18.0 + 36.0 + 7.0;
 
 /// The fault after half a second of motion: from it until the arm stood, ms, and the reason.
@@ -29,8 +29,7 @@ fn after(fault: Fault) -> (Bench, f64, ArmError) {
     (bench, stood_ms, reason)
 }
 
-/// It takes no order but a stop, and moves no more, until it is recovered; then only by a new
-/// order.
+/// It takes no order but a stop, and stands, until its recovery; then it moves only by a new order.
 fn stays_until_recovered(mut bench: Bench, reason: &ArmError) {
     let before = bench.world().arm.ball();
     assert_eq!(bench.arm.command(&sideways(36e-3)).as_ref(), Err(reason));
@@ -106,7 +105,7 @@ fn a_controller_that_says_the_same_again_is_stuck() {
     stays_until_recovered(bench, &reason);
 }
 
-/// At 36 mm/s about half a metre from its axes the joints are ordered to go 1.1° within some 300
+/// At 36 mm/s about half a metre from its axes the orders turn the joints by 1.1° within some 300
 /// ms.
 #[test]
 fn a_controller_that_takes_no_orders_is_named() {
@@ -124,7 +123,7 @@ fn a_dead_controller_is_named() {
     assert!(matches!(reason, ArmError::TopicSilent { .. }), "{reason}");
 }
 
-/// Nothing from here stops it: it is said, with what to do.
+/// Nothing from here stops it: the error says so and names the remedy.
 #[test]
 fn an_arm_that_goes_on_after_a_stop_is_said_so() {
     let mut bench = bench(seven());
@@ -142,7 +141,7 @@ fn an_arm_that_goes_on_after_a_stop_is_said_so() {
     assert!(matches!(bench.arm.recover(), Err(ArmError::GoesOn { .. })));
 }
 
-/// This process is gone, at any moment of the motion: what was ordered last ends at rest.
+/// The client process dies at any moment of the motion: its last order ends at rest.
 #[test]
 fn an_arm_whose_client_has_died_stands_by_itself() {
     for ms in [20, 60, 150, 333, 500] {
@@ -182,6 +181,6 @@ fn a_caller_that_was_held_up_orders_nothing_by_old_states() {
     bench.world().advance(4);
     assert_eq!(bench.world().taken, before);
     bench.order_for(200, &sideways(36e-3)).unwrap();
-    // one each 8 ms of 200, less what it takes to catch up
+    // one each 8 ms of 200, less those of the catch-up
     assert!(bench.world().taken > before + 20);
 }

@@ -16,7 +16,7 @@ use touchup::sim::{ArmParams, Plate, SimArm, WEIGHTLESS};
 use crate::chains::seven_joints;
 use stand_in::{Fault, SharedWorld, World, mounted, start};
 
-/// An arm above the plate, and what stands behind it.
+/// An arm above the plate, and the world behind it.
 struct Bench {
     arm: Ros2ControlArm,
     world: SharedWorld,
@@ -66,7 +66,7 @@ fn told(simulated: &ArmParams, clock: touchup::clock::Clock) -> Ros2ControlParam
     }
 }
 
-/// - `change`: of what is told of the arm.
+/// - `change`: of the told parameters of the arm.
 fn bench_with(
     simulated: ArmParams,
     change: impl FnOnce(&mut Ros2ControlParams),

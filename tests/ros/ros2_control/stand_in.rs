@@ -1,9 +1,9 @@
 //! Broadcasters, joint_trajectory_controller and drives of an arm, in the test's process and time:
 //! messages in, messages out.
 //!
-//! The controller is written from its documentation and by what its set point is said to do: a
-//! trajectory without places and with stamp zero begins as it comes, from the set point of the
-//! period before, its velocity is linear between points, and the last point is held. It refuses one
+//! The controller follows its documentation and the described behaviour of its set point: a
+//! trajectory without places and with stamp zero begins at its arrival, from the set point of the
+//! period before, its velocity is linear between points, and the last point holds. It refuses one
 //! that does not end at rest. An old one ([`World::repeats`]) begins from the set point as if it
 //! were that of now, and so repeats it.
 
@@ -27,31 +27,31 @@ const PERIOD_NS: i64 = 2_000_000;
 const STEP_NS: i64 = 1_000_000;
 /// On the network, ns.
 const ON_THE_WAY_NS: i64 = 1_000_000;
-/// Periods after which the drives are where the set point was.
+/// Delay of the drives behind the set point, periods.
 const DRIVES_LATE: usize = 2;
 /// Of the encoders, rad, and of the velocities that come of them, rad/s.
 const NOISE: [f64; 2] = [5e-6, 1e-3];
 /// Its clock is not that of the machine.
 const EPOCH_NS: i64 = 1_700_000_000_000_000_000;
 
-/// What goes wrong.
+/// Faults of the controller.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Fault {
     JointsSilent,
     WrenchSilent,
     /// All states come later from now on.
     Late(Duration),
-    /// The clock of the controller is set ahead or back, ms.
+    /// The clock of the controller jumps ahead or back, ms.
     StampsJump(i64),
     /// The same states come again and again; the drives hold.
     Frozen,
-    /// It is inactive: what it does it does to the end, and takes no more orders.
+    /// It is inactive: it finishes its motion, and takes no more orders.
     Inactive,
-    /// All of it ends; the drives hold where they are.
+    /// All of it ends; the drives hold their place.
     Dead,
-    /// It goes on as it goes, whatever is ordered.
+    /// It goes on in spite of any order.
     RunsOn,
-    /// So much is added to the force along z of the flange, N.
+    /// Addition to the force along z of the flange, N.
     Force(f64),
 }
 
@@ -79,7 +79,7 @@ pub struct World {
     late_ns: i64,
     jump_ns: i64,
     last: Option<ArmState>,
-    /// the last set point, where a trajectory comes
+    /// whether a new trajectory repeats the last set point
     pub repeats: bool,
     pub refused: usize,
     pub taken: usize,
@@ -375,7 +375,7 @@ impl ArmPort for StandIn {
     }
 }
 
-/// The first of a queue, where its time has come.
+/// The first of a queue, if it is due.
 fn due<T>(queue: &mut VecDeque<(i64, T)>, now_ns: i64) -> Option<T> {
     queue.front().filter(|(due_ns, _)| *due_ns <= now_ns)?;
     queue.pop_front().map(|(_, item)| item)

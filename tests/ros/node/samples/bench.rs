@@ -1,4 +1,4 @@
-//! A node with the world around it in process, and the demo plate to be touched.
+//! A node with the world around it in process, and the demo plate as the touched part.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -76,7 +76,7 @@ impl Plate {
         .unwrap();
     }
 
-    /// What `touchup refine` makes of a recording.
+    /// `touchup refine` of a recording.
     pub fn refined(&self, recording: &str) -> Vec<u8> {
         let (scan, bag, out) = (
             self.path("scan.ply"),
@@ -171,8 +171,7 @@ pub fn transform(
 
 /// Time passes in steps of this.
 const STEP: Duration = Duration::from_millis(5);
-/// What has not come by then never comes. It is time of the clock, which waits for all threads of
-/// the node.
+/// Limit of any wait, in time of the clock, which waits for all threads of the node.
 const NEVER: Duration = Duration::from_secs(60);
 
 /// A node that runs, and the world around it. Its time stands still but for [`Self::pass`], and
@@ -221,8 +220,8 @@ impl Bench {
         }
     }
 
-    /// All at once; none is dropped. Of many some time passes in between, in which they are taken
-    /// down.
+    /// All at once, without a loss. Every [`INBOX`] messages some time passes, in which the node
+    /// takes them down.
     pub fn feed<'a>(&self, messages: impl IntoIterator<Item = &'a Message>) {
         for (number, message) in (1..).zip(messages) {
             assert!(self.world.arrive_patiently(self.arrival(message)));
@@ -237,7 +236,7 @@ impl Bench {
         self.play_as(messages, |message| vec![self.arrival(message)]);
     }
 
-    /// As [`Self::play`], with what arrives instead of each message.
+    /// As [`Self::play`], with other arrivals in place of each message.
     pub fn play_as<'a>(
         &self,
         messages: impl IntoIterator<Item = &'a Message>,
@@ -272,7 +271,7 @@ impl Bench {
         self.clock.now()
     }
 
-    /// Returns when all that arrived was taken.
+    /// Returns when the node has taken all arrivals.
     pub fn taken(&self) {
         self.world.call(Call::ArmState).recv().unwrap();
     }
@@ -302,7 +301,7 @@ impl Bench {
         self.answer(&self.world.call(call))
     }
 
-    /// An answer that was asked for.
+    /// The answer to a request.
     pub fn answer<A>(&self, answers: &Receiver<A>) -> A {
         self.until("the answer", || match answers.try_recv() {
             Ok(answer) => Some(answer),
@@ -311,13 +310,13 @@ impl Bench {
         })
     }
 
-    /// Everything published so far.
+    /// All publications up to now.
     pub fn published(&mut self) -> &[Publication] {
         self.published.extend(self.world.published());
         &self.published
     }
 
-    /// Waits until something was published that `wanted` is true of.
+    /// Waits for a publication that `wanted` accepts.
     pub fn wait_for<T>(&mut self, what: &str, wanted: impl Fn(&Publication) -> Option<T>) -> T {
         let mut published = std::mem::take(&mut self.published);
         let found = self.until(what, || {
@@ -354,7 +353,7 @@ impl Bench {
             .next()
     }
 
-    /// Ends it; what was published comes too.
+    /// Ends the node; returns its end and the publications.
     pub fn end(mut self) -> (NodeEnd, Vec<Publication>) {
         self.world.arrive_patiently(Arrival::Shutdown);
         let Self { node, hand, .. } = self;
@@ -364,7 +363,7 @@ impl Bench {
     }
 }
 
-/// The end of a node; what its threads wait for until then passes.
+/// The end of a node; time passes until its threads have ended.
 pub fn join(node: Node, hand: &ManualClock) -> NodeEnd {
     let joins = std::thread::spawn(move || node.join());
     while !joins.is_finished() {
@@ -378,7 +377,7 @@ pub fn read(folder: &Path, name: &str) -> Vec<u8> {
     std::fs::read(folder.join(name)).unwrap()
 }
 
-/// The changes among what was published.
+/// The mesh changes among publications.
 pub fn patches(published: &[Publication]) -> Vec<MeshPatch> {
     let of = |publication: &Publication| match publication {
         Publication::MeshPatch(patch) => Some(patch.clone()),

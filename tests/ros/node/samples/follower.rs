@@ -12,10 +12,10 @@ pub struct Follower {
     pub version: u64,
     next_part: u32,
     pub vertices: BTreeMap<u32, [f32; 3]>,
-    /// of each vertex that was sent what it rests on, and the bits of its variance, m²
+    /// support of each received vertex, and the bits of its variance, m²
     pub known: BTreeMap<u32, (u8, u32)>,
     pub faces: BTreeMap<u32, [u32; 3]>,
-    /// the whole state is wanted
+    /// requests the whole state
     pub asks: bool,
     waits: bool,
     /// session and version of the whole state that has begun
@@ -91,7 +91,7 @@ impl Follower {
         (self.waits, self.asks, self.begun, self.quiet) = (true, true, None, 0);
     }
 
-    /// Asks again where no part of the whole state came for long.
+    /// Asks again after a long silence in the whole state.
     pub fn tick(&mut self) {
         self.quiet += 1;
         if self.waits && self.quiet > 20 {

@@ -1,5 +1,4 @@
-//! The node without any network: what it makes of what arrives, in whatever order, and what others
-//! see of it.
+//! The node without any network: its results from arrivals in any order, and the view of others.
 
 pub mod bench;
 pub mod follower;
@@ -23,9 +22,9 @@ use touchup::ros::parameters::ParameterValue;
 use touchup::ros::port::{ArmOrder, Arrival, Call, Endpoint, Publication};
 use touchup::stylus::{Message, StampedPose};
 
-/// What was taken is on the disk after so long.
+/// Time until taken samples are on the disk.
 const FLUSH: Duration = Duration::from_millis(50);
-/// The parameter `stale_ms` where nobody sets it.
+/// Default of the parameter `stale_ms`.
 const STALE: Duration = Duration::from_millis(100);
 
 /// Poses and wrenches each in their order, mixed at random: one stream can be far ahead of the
@@ -42,7 +41,7 @@ fn interleaved(messages: &[Message], seed: u64) -> Vec<Message> {
     while poses.peek().is_some() || wrenches.peek().is_some() {
         if left == 0 {
             (left, is_pose) = (rng.next_u32() % 400, !is_pose);
-            // neither gets further ahead than is held
+            // neither gets ahead by more than the node keeps
             if let (Some(pose), Some(wrench)) = (poses.peek(), wrenches.peek())
                 && (pose.stamp_ns() - wrench.stamp_ns()).abs() > 1_000_000_000
             {
@@ -86,7 +85,7 @@ fn the_result_is_that_of_refine_byte_for_byte_however_messages_interleave() {
             read(&end.folder, "refined.ply") == expected,
             "interleaving {seed}"
         );
-        // and what was recorded makes the same again
+        // and a refinement of the node's recording gives the same again
         refine(&[
             "--resume".as_ref(),
             end.folder.as_os_str(),
@@ -115,9 +114,9 @@ fn features_and_touches_are_written_beside_it() {
     assert_eq!(report["accepted"], end.report.accepted);
 }
 
-/// One of twenty changes is lost, and in their midst another session begins, whose versions count
-/// from 1 again. What the follower has in the end is compared with what one has that was there from
-/// the beginning and lost nothing, and with the tiles.
+/// The follower loses one of twenty changes, and in their midst another session begins, whose
+/// versions count from 1 again. Its mesh in the end equals that of a follower without losses from
+/// the beginning, and the tiles.
 #[test]
 #[ignore = "a slow proof"]
 #[expect(clippy::too_many_lines)]
@@ -165,7 +164,7 @@ fn a_follower_that_loses_messages_ends_with_the_mesh() {
             assert!(bench.call(Call::Reset).success);
         }
     }
-    // from here on nothing is lost: what is begun comes to its end
+    // no losses from here on: the whole state comes to its end
     for _ in 0..60 {
         bench.pass(Duration::from_millis(50));
         take(&mut bench, false, &mut follower, &mut strict);
@@ -181,7 +180,7 @@ fn a_follower_that_loses_messages_ends_with_the_mesh() {
         (&strict.session, strict.version)
     );
     assert!(follower.vertices == strict.vertices && follower.faces == strict.faces);
-    // who was there from the beginning was sent nothing of what was never touched
+    // a follower from the beginning received nothing about untouched vertices
     let is_known_alike = |(v, known): (&u32, &(u8, u32))| match strict.known.get(v) {
         Some(own) => own == known,
         None => known.0 == MeshPatch::SUPPORT_SCAN,
@@ -387,7 +386,7 @@ fn poses_wait_for_the_transform_of_a_moving_frame_and_not_for_ever() {
         })
     };
     bench.world.arrive_patiently(transforms(begin_ns));
-    // between two transforms the rig is taken to move evenly, which it does
+    // between two transforms the node assumes even motion of the rig, which is true
     let parts: Vec<_> = plate
         .messages
         .chunk_by(|a, b| a.stamp_ns() / 20_000_000 == b.stamp_ns() / 20_000_000)
@@ -497,7 +496,7 @@ fn pause_undo_redo_and_reset() {
     assert!(redone.strokes == 1 && redone.mesh_version > undone.mesh_version);
     bench.feed(&plate.messages[half..]);
     let pause = |is_paused| {
-        // what was sent before counts as before
+        // earlier messages count as before
         bench.taken();
         assert!(bench.world.stops().pause(is_paused).success);
     };
@@ -580,7 +579,7 @@ fn a_mesh_is_saved_into_the_folder_of_the_session_and_nowhere_else() {
     assert!(folder.join("part.features.json").exists() && folder.join("part.touches.csv").exists());
     assert!(!save("part.ply", false).success, "it is there");
     assert!(save("part.ply", true).success);
-    // what is saved is what the end writes of the same samples
+    // the saved file equals that of the end from the same samples
     let (end, _) = bench.end();
     assert!(read(&end.folder, "part.ply") == read(&end.folder, "refined.ply"));
 }
@@ -601,8 +600,8 @@ fn no_more_than_a_few_meshes_are_saved_at_a_time() {
         })
         .collect();
     let answers: Vec<_> = calls.iter().map(|call| bench.answer(call)).collect();
-    // how many are refused depends on how fast files are written: the bound itself is tested where
-    // the threads are
+    // the number of refusals depends on the speed of writing files: a unit test of the threads
+    // checks the bound itself
     let (saved, refused): (Vec<_>, Vec<_>) = answers.iter().partition(|answer| answer.success);
     println!("{} saved, {} refused", saved.len(), refused.len());
     assert!(!saved.is_empty());
@@ -696,7 +695,7 @@ fn features_are_found_flagged_and_labelled() {
         kinds: vec![Feature::KIND_HOLE],
     };
     let named = bench.call(|reply| Call::Detect(holes, reply));
-    // the topic has what the answer names
+    // the topic has the features of the answer
     let shown = bench.wait_for("what was found", |published| match published {
         Publication::Features(array) if array.mesh_version >= named.mesh_version => {
             Some(array.features.clone())
@@ -863,7 +862,7 @@ fn it_holds_while_a_stream_is_away_and_after_the_clock_was_set_back_and_goes_on(
     bench.wait_for("the hold", |published| {
         words(published).filter(|words| words.starts_with("holds, a stream is stale"))
     });
-    // the recording is played again: every stamp is before the last
+    // the recording comes again: every stamp is before the last
     bench.feed(&plate.messages);
     let jumps: u64 = bench.diagnostic("clock_jumps").unwrap().parse().unwrap();
     assert!(jumps >= 1, "{jumps} jumps");
@@ -887,7 +886,7 @@ fn it_holds_while_a_stream_is_away_and_after_the_clock_was_set_back_and_goes_on(
     assert!(std::fs::read(plate.path("again.ply")).unwrap() == read(&end.folder, "refined.ply"));
 }
 
-/// What kill -9 leaves is what the system has at that moment: a copy of the folder.
+/// A copy of the folder holds the same as kill -9 leaves: the state of the system at that moment.
 #[test]
 fn what_is_on_the_disk_while_it_runs_can_be_refined_and_lacks_50_ms() {
     let plate = Plate::touched(0.1);
