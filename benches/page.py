@@ -1,11 +1,11 @@
-"""What the operator's page costs in a browser on a large scan, a wavy plate over which a ball slides: when the first part and the whole of
-the mesh are in the picture, how long the main thread works on a frame while the camera turns and while the mesh is edited, and how long
-after its sample an edit is in the page.
+"""Cost of the operator page in a browser on a large scan, a wavy plate under a sliding ball: time until the first part and the whole of the
+mesh are in the picture, work of the main thread on a frame while the camera turns and while the mesh changes, and delay from a sample to
+its edit in the page.
 
     TOUCHUP_BIN=target/release/touchup target/python/bin/python benches/page.py [--faces 1000000] [--seconds 20] [--json]
 
-A release build with feature `web`, and the environment of tests/all.sh. WebGL is drawn by the processor: what the page's main thread does is
-as it would be with a GPU, how soon the picture follows is not, so a small window is drawn. A quiet machine, or compare within one run.
+A release build with feature `web`, and the environment of tests/all.sh. The processor draws WebGL: the work of the page's main thread is
+that beside a GPU, the delay of the picture is not, so the window is small. A quiet machine, or compare within one run.
 """
 
 import argparse
@@ -43,7 +43,7 @@ from web_page import PageNode, Socket  # noqa: E402
 
 SIDE_MM, WAVE_MM, HEIGHT_MM = 300.0, 40.0, 2.0
 RADIUS_MM, STIFFNESS_N_PER_MM, FORCE_N = 1.5, 20.0, 2.0
-# the part lies so much below the scan: every contact moves vertices
+# depth of the part below the scan: every contact moves vertices
 DEPTH_MM = 0.05
 RATE_HZ, SPEED_MM_PER_S, LINE_MM, WIDTH_MM = 500, 50.0, 0.7, 20.0
 WINDOW = (640, 480)
@@ -79,7 +79,7 @@ def height_mm(x, y):
 
 
 def write_plate(path, faces):
-    """A structured grid of about so many triangles, mm."""
+    """A structured grid of about `faces` triangles, mm."""
     cells = max(round((faces / 2) ** 0.5), 1)
     x, y = numpy.meshgrid(*[numpy.linspace(0, SIDE_MM, cells + 1)] * 2, indexing="ij")
     vertices = numpy.stack([x, y, height_mm(x, y)], axis=-1).reshape(-1, 3)
@@ -91,7 +91,7 @@ def write_plate(path, faces):
 
 
 def ball(i):
-    """Where the ball is reported and which force is felt, mm and N, at sample `i` of a raster over the middle of the plate."""
+    """Reported place of the ball and measured force, mm and N, at sample `i` of a raster over the middle of the plate."""
     way = i / RATE_HZ * SPEED_MM_PER_S
     line, along = divmod(way, WIDTH_MM)
     x = SIDE_MM / 2 - WIDTH_MM / 2 + (along if line % 2 == 0 else WIDTH_MM - along)
@@ -121,7 +121,7 @@ def slide(domain, seconds):
 
 
 class Follower(Socket):
-    """Keeps of the mesh only when the newest sample of each version was sent."""
+    """Keeps of the mesh only the sending time of the newest sample of each version."""
 
     def __init__(self, url):
         self.stamps_ms = {}
@@ -154,7 +154,7 @@ def quantiles(values):
 
 
 def delays_ms(edits, stamps_ms):
-    """From the sending of a version's newest sample until the page has it, for each version of which both are known."""
+    """Delay from the sending of a version's newest sample to the page, for each version with both times."""
     return [at_ms - stamps_ms[version] for at_ms, version in edits if version in stamps_ms]
 
 

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Runs a command on a machine that is made busy: its tests have to give the same count.
+"""Runs a command on a busy machine: its tests have to give the same count.
 
     tests/beside.py [--busy N] [--stops] COMMAND...
 
---busy N: beside so many endless loops of ordinary priority. --stops: all processes of the command stop for 200 ms every few
-seconds (SIGSTOP, SIGCONT), as on a machine whose host has something else to do. Ends with the exit code of the command.
+--busy N: beside N endless loops of ordinary priority. --stops: all processes of the command stop for 200 ms every few seconds (SIGSTOP,
+SIGCONT), as on a machine whose host has something else to do. Ends with the exit code of the command.
 """
 
 import argparse
@@ -66,7 +66,7 @@ def main():
                     signal_all(stopped, signal.SIGCONT)
                     stops += 1
     finally:
-        # those of the command that are left where this was interrupted
+        # processes of the command that remain after an interruption
         signal_all(processes_of(process.pid), signal.SIGTERM)
         for loop in loops:
             loop.kill()

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """Counts the tests of a run: tests/count.py FOLDER
 
-FOLDER has reports in the form of JUnit (`*.xml`) and lists of what has no such report (`notes.tsv`: passed, failed or skipped, a
-name, a reason). Prints the slowest tests, those that failed or were skipped, and the count as the last line; the exit code is
-0 only when nothing failed. A test that could not run prints `SKIPPED: NAME: REASON`, and counts as skipped.
+FOLDER has reports in the form of JUnit (`*.xml`) and lists of tests without such a report (`notes.tsv`: passed, failed or skipped, a name,
+a reason). Prints the slowest tests, failed and skipped ones, and the count as the last line; the exit code is 0 only without failures. A
+test that could not run prints `SKIPPED: NAME: REASON`, and counts as skipped.
 """
 
 import csv

@@ -35,7 +35,7 @@ def printed_by(test, reports):
         for case in tree.parse(report).iter("testcase"):
             if f"{case.get('classname', '')}::{case.get('name')}".partition("[")[0].endswith(test):
                 text = "".join(out.text or "" for out in case.iter("system-out"))
-                # libtest frames the output of its one test, and says what takes longer than a minute
+                # libtest frames the output of its one test, and names tests longer than a minute
                 text = re.sub(r"^test \S+ has been running for over .*\n", "", text, flags=re.MULTILINE)
                 inner = re.search(r"^running 1 test\n(.*?)^test \S+ \.\.\. ", text, re.DOTALL | re.MULTILINE)
                 return (inner[1] if inner else re.sub(r"^-+ Captured .*-+\n", "", text, flags=re.MULTILINE)).strip("\n")

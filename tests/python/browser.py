@@ -37,7 +37,7 @@ def wait_until(page, expression, deadline_s=DEADLINE_S):
 
 
 def picture(page):
-    """What is in the canvas as the screen has it, red, green and blue of each pixel, and the canvas' place in it."""
+    """Pixels of the canvas on the screen, red, green and blue of each, and the canvas' place in it."""
     page.evaluate("touchup.idle()")
     shot = numpy.asarray(Image.open(io.BytesIO(page.screenshot())).convert("RGB")).astype(int)
     box = page.locator("canvas").first.bounding_box()

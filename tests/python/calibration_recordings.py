@@ -1,4 +1,4 @@
-"""Recordings that are made for a calibration, as a tracker and a force sensor give them: written by rosbags, with a known truth in them."""
+"""Synthetic recordings for a calibration, as a tracker and a force sensor give them, with a known truth; rosbags writes them."""
 
 import numpy
 from rosbags.rosbag2 import StoragePlugin, Writer
@@ -10,7 +10,7 @@ TYPES = store.types
 
 # centre of the ball from the tracked point
 OFFSET_MM = numpy.array([2.1, -1.3, -141.8])
-# where the scan lies in space
+# pose of the scan in space
 SPACE_TURN, SPACE_MM = Rotation.from_rotvec([0.5, -1.2, 2.0]), numpy.array([410.0, -220.0, 130.0])
 WEIGHT_N, CENTRE_MM = numpy.array([0.3, -0.2, -2.7]), numpy.array([4.0, -11.0, 52.0])
 BIAS_N, BIAS_NM = numpy.array([-2.0, 3.5, 1.0]), numpy.array([0.12, -0.3, 0.05])
@@ -56,7 +56,7 @@ def dwells():
 
 
 def loaded(turn, rng):
-    """Force and torque that the sensor feels of what it carries."""
+    """Force and torque at the sensor from its payload."""
     weight = turn.inv().apply(WEIGHT_N)
     force = weight + BIAS_N + rng.normal(0, NOISE_N, 3)
     return force, numpy.cross(CENTRE_MM * 1e-3, weight) + BIAS_NM + rng.normal(0, NOISE_NM, 3)

@@ -1,8 +1,8 @@
 """Shared by the tests of this folder: the binary, the shared data, the judge.
 
-`tests/all.sh` sets TOUCHUP_BIN; without it the release binary of `target/` is used. A test whose data or system packages are
-missing is skipped with the reason. What is marked `full` is a slow proof, for the shards of tests/shards.sh (TOUCHUP_FULL), and is
-not selected without; files that need their Python packages are not read then.
+`tests/all.sh` sets TOUCHUP_BIN; without it the tests use the release binary of `target/`. A test skips with the reason if data or system
+packages are missing. The mark `full` names a slow proof, for the shards of tests/shards.sh (TOUCHUP_FULL); without the variable pytest does
+not select it, and does not read files that need its Python packages.
 """
 
 import os
@@ -39,7 +39,7 @@ def pytest_assertrepr_compare(op, left, right):
 
 
 def pytest_terminal_summary(terminalreporter):
-    """Says how many blocks of the documentation ran, where they did."""
+    """Prints the number of executed blocks of the documentation, if any."""
     reports = [report for reports in terminalreporter.stats.values() for report in reports]
     if any("test_docs_code.py" in getattr(report, "nodeid", "") for report in reports):
         import doc_blocks
@@ -69,7 +69,7 @@ def touchup(touchup_bin):
 
 @pytest.fixture(scope="session")
 def demo_folder(touchup, tmp_path_factory):
-    """What `touchup demo` writes: truth, scan and 74 s of touches, and what refine makes of them. No test writes there."""
+    """Output of `touchup demo`: truth, scan and 74 s of touches, and their refinement. No test writes there."""
     out = tmp_path_factory.mktemp("demo")
     done = touchup("demo", "--out", out)
     assert done.returncode == 0, done.stderr

@@ -15,10 +15,11 @@ from conftest import ROOT
 OTHERS = ["README.md", "crates/touchup-python/README.md", "examples/sweep/README.md"]
 PAGES = [*(ROOT / page for page in OTHERS), *sorted((ROOT / "docs").glob("*.md"))]
 
-# kind -> what is done with it; nothing is run of what a program prints, of formulas and drawings
+# kinds of blocks; output of programs, formulas and drawings do not run
 RUN, OUTPUT = {"sh", "console", "python", "yaml", "json", "rust"}, {"text"}
 
-# reasons for which a block of commands or code is not run, each with what it must have: a mark without it is not needed
+# permitted reasons against running a block of commands or code, each with the pattern that the block must have: without it the mark is
+# unnecessary
 REASONS = {
     "needs ROS": r"\bros2 |/opt/ros|colcon",
     "needs Ray": r"\btouchup\.ray\b",
@@ -39,7 +40,7 @@ MARK = re.compile(r"<!-- not run: (.+?) -->$")
 class Block:
     page: str
     line: int
-    # sh, python, …; empty where the fence names none
+    # sh, python, …; empty for a fence without a name
     kind: str
     options: tuple[str, ...]
     code: str
@@ -73,7 +74,7 @@ def marks_of(page):
 
 
 def problem(block):
-    """What is wrong with the mark of a block, or with its lack; None where nothing is."""
+    """Fault of the mark of a block, or of its lack; None without a fault."""
     if not block.kind:
         return "its fence names no language: sh, python, yaml, …, or text for what a program prints"
     if block.kind in OUTPUT:

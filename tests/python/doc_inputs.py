@@ -1,4 +1,4 @@
-"""Small inputs under the names that the pages use, and what stands in a block for a build: programs that are built already."""
+"""Small inputs under the names that the pages use, and prebuilt programs for blocks that build."""
 
 import json
 import os
@@ -26,7 +26,7 @@ keys: {contact.on_n: [0.3, 0.4]}
 
 
 def make_inputs(touchup, folder):
-    """The part: a ring with a hole of 8 mm through 5 mm, and what a scanner, a stylus and a calibration make of it."""
+    """The part: a ring with a hole of 8 mm through 5 mm, with the outputs of a scanner, a stylus and a calibration."""
     part = trimesh.creation.annulus(r_min=4.0, r_max=11.0, height=5.0, sections=96)
     for name in ("part.stl", "truth.stl", "part.ply"):
         part.export(folder / name)
@@ -115,9 +115,9 @@ def write_table(path, samples):
 
 
 def make_programs(folder, touchup_bin, features):
-    """`touchup` as it was built, and `cargo run` of what was built beside it, for the PATH of a block.
+    """The built `touchup`, and a `cargo run` of the programs built beside it, for the PATH of a block.
 
-    A demo is the same each time, so it is made once and copied. Exit code 4, done with losses, is as good as 0 here.
+    A demo is the same each time, so it runs once and blocks copy it. Exit code 4, done with losses, is as good as 0 here.
     """
     folder.mkdir()
     known = {"program": str(touchup_bin), "made": str(folder / "demos"), "features": features}

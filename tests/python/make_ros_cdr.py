@@ -59,7 +59,7 @@ def definitions():
         for path in sorted((ROOT / "msg" / kind).iterdir()):
             texts = re.split(r"^---$", path.read_text(), flags=re.MULTILINE)
             found.update((f"touchup_msgs/{kind}/{path.stem}{part}", text) for part, text in zip(parts, texts, strict=True))
-    # within a package a type may be named alone
+    # within a package a type name may omit the package
     own = [name.rsplit("/", 1)[1] for name in found if name.startswith("touchup_msgs/msg/")]
     alone = re.compile(rf"^({'|'.join(own)})(?=[ \[])", re.MULTILINE)
     return {name: alone.sub(r"touchup_msgs/msg/\1", text) for name, text in found.items()}

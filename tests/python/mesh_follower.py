@@ -1,4 +1,4 @@
-"""A program that follows the mesh by MeshPatch and ResyncMesh alone, as docs/ros.md says: whatever is lost in transport, it ends with the
+"""A program that follows the mesh by MeshPatch and ResyncMesh alone, as docs/ros.md says: after any losses in transport, it ends with the
 mesh of the node. Its messages may be those of any library that has the fields of msg/msg/MeshPatch.msg; test_ros_node.py runs it.
 """
 
@@ -9,8 +9,8 @@ class Follower:
     def __init__(self, resync):
         self.vertices, self.faces = {}, {}
         self.session, self.version, self.next_part = "", 0, 0
-        # the service; whether the whole state is waited for, which one has begun, for how long nothing of it came, and the
-        # changes since it began
+        # the service; whether it waits for the whole state, which one has begun, the time since its last part, and the changes since it
+        # began
         self.resync, self.is_waiting, self.begun, self.waited, self.kept = resync, False, None, 0, []
 
     def take(self, patch):
@@ -27,7 +27,7 @@ class Follower:
             self.ask()
 
     def take_whole(self, patch):
-        """A part of the whole state: of any that begins while it is waited for."""
+        """A part of the whole state: of any that begins during the wait."""
         if patch.part == 0:
             self.vertices, self.faces = {}, {}
             # earlier changes are in it
@@ -47,7 +47,7 @@ class Follower:
         self.resync()
 
     def tick(self):
-        """Called from time to time: asks again where a part of the whole state was lost."""
+        """A periodic call: asks again if a part of the whole state is missing."""
         self.waited += 1
         if self.is_waiting and self.waited > 10:
             self.ask()

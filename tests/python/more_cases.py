@@ -1,7 +1,7 @@
 """python tests/python/more_cases.py TOUCHUP OUT: the judged cases in other frames, and other parts, as a table on stdout.
 
-Turned and shifted recordings show what depends on how a part lies in the lattice; the other parts are scanned and touched by
-`touchup simulate` and show what was tuned on the judged ones. It takes ten minutes.
+Turned and shifted recordings show the influence of a part's place in the lattice; `touchup simulate` scans and touches the other parts,
+which show tuning on the judged ones. It takes ten minutes.
 """
 
 import json
@@ -72,7 +72,7 @@ def other_frame(case, out, degrees, shift):
 
 
 def parts():
-    """Names and closed meshes in mm, from parts that nothing here was made with."""
+    """Names and closed meshes in mm, from parts that played no role in development."""
 
     def load(name, unit_mm):
         mesh = trimesh.load(SHARED / "data/parts/permissive" / name, force="mesh")
@@ -113,7 +113,7 @@ def parts():
 
 
 def simulated(touchup, part, out):
-    """Scan, recording, and where the ball really touched, as far as its recording shows."""
+    """Scan, recording, and the truly touched places of the ball, as far as its recording shows."""
     out.mkdir(parents=True, exist_ok=True)
     part.apply_translation(-part.bounds[0])
     part.export(out / "part.stl")

@@ -15,7 +15,7 @@ from conftest import ROOT
 from playwright.sync_api import sync_playwright
 from web_page import PageDemo
 
-# after most of the plate was touched, s
+# after the touches of most of the plate, s
 AFTER_S = 56
 
 

@@ -11,14 +11,16 @@ def ns(stamp):
 
 
 def copy_part(recording, out, is_kept):
-    """Copies the messages whose topic and stamp, ns, are kept of a recording, a file or the folder of a session's; how many were left out."""
+    """Copies the messages of a recording, a file or a session's folder, that `is_kept` accepts by topic and stamp, ns; returns the number
+    of others.
+    """
     left_out = 0
     with open(out, "wb") as file:
         writer, channels = Writer(file), {}
         writer.start(profile="ros2")
         for part in sorted(recording.glob("*.mcap")) if recording.is_dir() else [recording]:
             for schema, channel, message in make_reader(part.open("rb")).iter_messages(log_time_order=False):
-                # behind the four bytes that say how a message is encoded: it begins with its header
+                # behind the four bytes of the encoding a message begins with its header
                 sec, nanosec = struct.unpack_from("<iI", message.data, 4)
                 if not is_kept(channel.topic, sec * 10**9 + nanosec):
                     left_out += 1

@@ -1,6 +1,6 @@
 """python render.py OUT.png MESH...    draws meshes side by side, seen from above at a slant; back faces are red.
 
-Needs open3d only (no display): rays are cast, not drawn. Used for the picture in the README:
+Needs open3d only (no display): it casts rays. It makes the picture in the README:
 
     cargo run --release -- demo --out out
     target/python/bin/python tests/python/render.py docs/demo.png out/scan.ply out/refined.ply out/truth.ply

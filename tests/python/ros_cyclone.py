@@ -98,7 +98,7 @@ class WrenchStamped:
     wrench: Wrench
 
 
-# what ends too early
+# peers that end too early
 @message("geometry_msgs/msg/WrenchStamped")
 class HeaderAlone:
     header: Header

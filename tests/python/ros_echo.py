@@ -8,7 +8,7 @@ from running import Running
 
 
 def echo_binary():
-    """What cargo has built last; cargo test builds it too."""
+    """The newest build of cargo; cargo test builds it too."""
     places = [ROOT / "target" / profile / "examples/ros_echo" for profile in ("release", "debug")]
     built = [place for place in places if place.is_file()]
     if os.environ.get("TOUCHUP_ECHO"):

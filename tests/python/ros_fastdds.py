@@ -1,6 +1,6 @@
 """The peer of tests/fastdds/peer.cpp as processes: a ROS 2 node with rmw_fastrtps, by Fast DDS alone.
 
-It is built here with Debian's Fast DDS, or with the one below FASTDDS_ROOT. Messages are written and read by rosbags.
+It uses Debian's Fast DDS, or the one below FASTDDS_ROOT. rosbags writes and reads messages.
 """
 
 import os
@@ -87,7 +87,7 @@ class Peer(Running):
         super().__init__(command, {"LD_LIBRARY_PATH": str(fast_dds.libraries)})
 
     def finish(self):
-        """Waits for its end; what it wrote."""
+        """Waits for its end; returns its output."""
         assert self.wait() == 0, self.text()
         return self.text()
 

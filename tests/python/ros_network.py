@@ -1,7 +1,7 @@
 """Computers of their own, as network namespaces, and the network between them: a hub that loses packets and breaks down.
 
-Each computer has one interface, a TAP device whose other end is a thread here. What one sends goes to all
-others, as on a hub: addresses and multicast need nothing else. Needs root (or user namespaces), iproute2 and /dev/net/tun.
+Each computer has one interface, a TAP device whose other end is a thread here. Packets of one go to all others, as on a hub: addresses and
+multicast need nothing else. Needs root (or user namespaces), iproute2 and /dev/net/tun.
 """
 
 import ctypes
@@ -22,7 +22,7 @@ libc = ctypes.CDLL(None, use_errno=True)
 
 
 def needed():
-    """Skips where the system has no such networks."""
+    """Skips on a system without such networks."""
     if not os.path.exists("/dev/net/tun") or os.geteuid() != 0:
         pytest.skip("needs root and /dev/net/tun, for networks of its own")
 

@@ -1,7 +1,7 @@
-"""Plays a recording to a node over CycloneDDS, in step with it: however busy the machine is, nothing is lost in transport.
+"""Plays a recording to a node over CycloneDDS, in step with it: on a machine of any load, no message is lost in transport.
 
-Streams of samples are best effort: messages beyond the capacity of a node's socket are lost. So a few messages are
-sent at a time, and then the node is asked something that it answers behind them, as it takes all that comes one after the other.
+Streams of samples are best effort: the network drops messages beyond the capacity of a node's socket. So the player sends a few messages at
+a time, and then asks the node something that it answers behind them, since it takes arrivals one after the other.
 """
 
 import itertools
@@ -25,8 +25,8 @@ from ros_cyclone import (
 )
 from ros_process import Client
 
-# two of these fit into the buffer of a socket on Linux, which holds some 200 such messages: of the last one some may not be taken
-# from it when the answer to the question behind it is sent
+# two of these fit into the buffer of a socket on Linux, which holds some 200 such messages: the node may not have taken some of the last
+# one from it when it sends the answer to the question behind it
 WINDOW = 64
 
 
@@ -51,8 +51,9 @@ STAMPED = {
 def recorded(recording, streams=STAMPED, most=None):
     """Messages of a recording in order of their stamps, as a sensor sends them: topic and message.
 
-    - `streams`: for each topic of the recording that on which it is played, the type, and what makes one of a header and of what was read.
-    - `most`: so many of those that were recorded first; all of them where it is left out.
+    - `streams`: for each topic of the recording the played topic, the type, and a function of a header and the recorded message that makes
+      one.
+    - `most`: number of messages from the beginning of the recording; all of them without it.
     """
     messages = []
     with recording.open("rb") as file:
@@ -66,14 +67,14 @@ def recorded(recording, streams=STAMPED, most=None):
 
 
 def sent_in_step(node, domain, kinds, messages, window=WINDOW):
-    """Sends messages, and yields each time that the node has taken what was sent. The node has `service_mapping:=cyclone`.
+    """Sends messages, and yields each time that the node has taken the sent ones. The node has `service_mapping:=cyclone`.
 
-    - `kinds`: the type of each topic; `messages`: topic and message each, or topic and what makes the message when it is sent.
-    - `window`: messages that are sent at a time; fewer where they are larger than a sample.
+    - `kinds`: the type of each topic; `messages`: topic and message each, or topic and a function that makes the message at its sending.
+    - `window`: number of messages at a time; fewer for those larger than a sample.
     """
     peer = Peer(domain)
     writers = {topic: peer.writer(topic, kind, BEST_EFFORT) for topic, kind in kinds.items()}
-    # the node hears of writers in the order in which they are made: when it answers, it knows those of the samples
+    # the node hears of writers in the order of their creation: when it answers, it knows those of the samples
     state = Client(node, domain, "arm_state", TriggerRequest, TriggerResponse, peer)
     state.introduce(0)
     # and has turned to their types

@@ -1,4 +1,4 @@
-"""touchup as processes on a network: the node, and recordings that are played to it."""
+"""touchup as processes on a network: the node, and recordings played to it."""
 
 import itertools
 import json
@@ -45,7 +45,7 @@ class Client:
         self.writer, self.reader = self.peer.client(f"/touchup/{name}", request, response)
 
     def introduce(self, *harmless):
-        """Asks what changes nothing until it is answered: from then on both sides know each other, and nothing is lost."""
+        """Repeats a question without effect until its answer: from then on both sides know each other, and no message is lost."""
         answers = []
 
         def is_answered():

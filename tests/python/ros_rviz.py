@@ -2,8 +2,8 @@
 
     target/python/bin/python tests/python/ros_rviz.py docs/rviz.png     draws the picture of the README
 
-Debian has the RViz of ROS 1: messages go into a ROS 1 bag by rosbags and out by rosbag play, frames come from
-robot_state_publisher, and config/touchup.rviz is written in the older names. Everything runs on loopback, on free ports.
+Debian has the RViz of ROS 1: messages go into a ROS 1 bag by rosbags and out by rosbag play, frames come from robot_state_publisher, and a
+copy of config/touchup.rviz has the older names. Everything runs on loopback, on free ports.
 """
 
 import contextlib
@@ -51,7 +51,7 @@ def missing_packages():
 
 
 def of_ros1(message, name):
-    """A message of CycloneDDS as one of ROS 1: fields that it does not have are left out, times are called otherwise."""
+    """A message of CycloneDDS as one of ROS 1: without the fields that ROS 1 lacks, and with its names of times."""
     package, _, short = name.partition("/msg/")
     made = store.types[name]
     if short in ("Time", "Duration") and package == "builtin_interfaces":
@@ -85,7 +85,7 @@ def write_bag(path, messages):
 
 
 def older(node):
-    """What RViz 2 has in its file, as RViz 1 has it."""
+    """Contents of an RViz 2 file in the form of RViz 1."""
     if isinstance(node, list):
         return [older(value) for value in node]
     if not isinstance(node, dict):
@@ -109,7 +109,7 @@ def config(path, size, view, hidden=()):
     """Writes config/touchup.rviz for RViz 1, with a window that fills the screen; returns its view.
 
     - `view`: changed settings of the view
-    - `hidden`: names of displays that are switched off
+    - `hidden`: names of displays to switch off
     """
     made = older(yaml.safe_load((ROOT / "config/touchup.rviz").read_text()))
     manager = made["Visualization Manager"]
@@ -117,7 +117,7 @@ def config(path, size, view, hidden=()):
         if display["Name"] in hidden:
             display["Enabled"] = display["Value"] = False
     manager["Views"]["Current"].update(view)
-    # without a window manager it stays where it is put
+    # without a window manager it keeps its place
     made["Window Geometry"].update({"X": 0, "Y": 0, "Width": size[0], "Height": size[1]})
     Path(path).write_text(yaml.safe_dump(made))
     return manager["Views"]["Current"]
@@ -265,7 +265,7 @@ def described(name, scene):
 
 
 def camera(view):
-    """Where the camera of the view is, and its axes: right, down, forward."""
+    """Place of the view's camera, and its axes: right, down, forward."""
     yaw, pitch = view["Yaw"], view["Pitch"]
     focus = numpy.array([view["Focal Point"][axis] for axis in "XYZ"], float)
     outward = numpy.array([numpy.cos(yaw) * numpy.cos(pitch), numpy.sin(yaw) * numpy.cos(pitch), numpy.sin(pitch)])
@@ -297,7 +297,7 @@ def projected(view, size, points):
 
 
 def main(out):
-    """Plays the recording of the demo to a node, and takes RViz's picture of what the node shows."""
+    """Plays the recording of the demo to a node, and takes RViz's picture of the node's topics."""
     import open3d
     from ros_domains import domains
     from ros_shown import show

@@ -1,4 +1,4 @@
-"""A sensor as a process of its own, which can be stopped: sends wrenches, and says which of them came back as mismatches.
+"""A sensor as a process of its own, which a test can stop: sends wrenches, and prints those that came back as mismatches.
 
 python ros_sender.py DOMAIN
 """

@@ -45,7 +45,7 @@ def labels(array):
 
 
 def show(touchup_bin, demo, out, domain, label_count):
-    """Plays demo/touch.mcap to a node with demo/scan.ply and sessions in out, and waits until so many features have labels."""
+    """Plays demo/touch.mcap to a node with demo/scan.ply and sessions in out, and waits for the expected number of labelled features."""
     ros = ["-p", f"scan:={demo / 'scan.ply'}", "-p", "tip_radius_mm:=1.5", "-p", f"view_rate_hz:={VIEW_RATE_HZ}"]
     with Node(touchup_bin, out, domain=domain, ros=ros) as node:
         peer = Peer(domain)
@@ -65,6 +65,6 @@ def show(touchup_bin, demo, out, domain, label_count):
 
         node.wait_for(all_there, 120)
         tips = tip.take(100_000)
-        # 4: samples were lost, which is no matter here
+        # 4: losses of samples do not matter here
         assert node.end() in (0, 4), node.text()
     return Shown([tiles[number] for number in sorted(tiles)], arrays[-1], tips[-1], node.session)

@@ -1,18 +1,18 @@
-"""Programs that run beside a test, and what they write."""
+"""Programs beside a test, and their output."""
 
 import os
 import subprocess
 import threading
 import time
 
-# nothing is waited for longer; nothing is expected to take as long
+# limit of any wait; nothing should take as long
 DEADLINE_S = 120
 
 
 class Running:
     """A running program, the lines that it writes, and those on its stderr."""
 
-    # exit codes with which it may end while it is waited for
+    # permitted exit codes during the wait
     may_end_with = ()
 
     def __init__(self, command, environment=(), folder=None):

@@ -1,4 +1,4 @@
-"""A node that is set up on the page, over HTTP."""
+"""A node in its setup on the page, over HTTP."""
 
 import http.client
 import json
@@ -45,7 +45,7 @@ class SetupNode(Process):
         return found
 
     def read(self, **options):
-        """The setup when no scan is being read any more."""
+        """The setup after the reading of the scan."""
         until = time.monotonic() + DEADLINE_S
         while (found := self.state(**options))["scan"]["state"] == "reading":
             assert time.monotonic() < until
@@ -58,7 +58,7 @@ class SetupNode(Process):
         return self.read()
 
     def calibrated(self, **request):
-        """What comes of a calibration."""
+        """Result of a calibration."""
         status, found = self.ask("/api/setup/calibrate", request)
         assert status == 200, found
         self.wait_for(lambda: self.state()["calibration"]["state"] != "running")
@@ -78,7 +78,7 @@ def page_on(browser, url, size, language="en", **options):
 
 
 def check_looks(page, tmp_path, name):
-    """A picture, and what axe-core finds in it; nothing is wider than the window, and buttons are large enough for a finger."""
+    """A picture, and the findings of axe-core in it; nothing is wider than the window, and buttons are large enough for a finger."""
     page.screenshot(path=tmp_path / f"{name}.png")
     page.add_script_tag(path=AXE)
     found = page.evaluate("axe.run(document, { resultTypes: ['violations'] })")["violations"]

@@ -39,7 +39,7 @@ def refine(touchup, folder, scan, out):
 
 
 def closest(vertices, faces, points):
-    """Where the surface is nearest, and on which face."""
+    """Closest points of the surface, and their faces."""
     squared = igl.point_mesh_squared_distance(np.asarray(points, dtype=float), vertices, faces.astype(np.int64))
     return squared[2], squared[1].ravel()
 
@@ -71,7 +71,7 @@ def test_vertices_have_the_colour_of_the_scan(touchup, demo, tmp_path, name, alp
     _, face = closest(vertices, faces, new)
     corners = faces[face]
     nearest = corners[np.arange(len(new)), np.linalg.norm(vertices[corners] - new[:, None], axis=2).argmin(axis=1)]
-    # where two faces are equally near another one may be taken
+    # of two equally near faces the program may take the other one
     assert np.mean((found[~kept, :3][::7] == colours[nearest]).all(axis=1)) > 0.97
 
 
@@ -151,7 +151,7 @@ def test_faces_show_the_same_place_of_the_image(touchup, demo, tmp_path, name):
     assert len(same) > 500 and new.sum() > 500
     # the program has single precision, as PLY files have
     assert all(np.array_equal(a.astype(np.float32), b.astype(np.float32)) for a, b in same)
-    # a new face is in one chart, and there where the scan was nearest
+    # a new face is in one chart, at the nearest place of the scan
     middle, _ = closest(vertices, faces, corners[new].mean(axis=1))
     of_middle = found[new].mean(axis=1)
     in_second = of_middle[:, 0] > 0.5

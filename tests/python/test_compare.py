@@ -126,5 +126,5 @@ def test_a_real_part_against_itself_moved_by_noise(touchup, shared, tmp_path):
     points = np.stack([rows["x"], rows["y"], rows["z"]], axis=1)
     by_igl = 25.4 * signed_distances(points, vertices, faces)
     off = np.abs(rows["deviation_mm"] - by_igl)
-    # where a distance is near nothing, the points themselves are rounded on the way to metres and back
+    # near a distance of 0, the rounding of the points themselves counts on the way to metres and back
     assert (off <= RELATIVE * np.abs(by_igl) + 1e-11).all(), off.max()

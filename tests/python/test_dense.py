@@ -110,12 +110,12 @@ def test_detail_stays_where_it_agrees_with_touch_and_holes_open(touchup, tmp_pat
     height = floor_height(after)
     print(f"floor of the lines at {height:.4f} mm")
     assert abs(height + DEPTH) < 0.02
-    # no face of the refined mesh is in the way of a pin in a hole; where the ball turned back below the plate nothing is said
+    # no face of the refined mesh obstructs a pin in a hole; below the plate, at the turn of the ball, the test says nothing
     middle = np.asarray(after.triangles_center)
     for x, y, radius in HOLES:
         is_in_the_way = (np.hypot(middle[:, 0] - x, middle[:, 1] - y) < 0.8 * radius) & (middle[:, 2] > -7)
         assert not is_in_the_way.any(), (x, y)
-    # what was not touched is as scanned, to the last bit that a file in mm keeps
+    # untouched vertices are as scanned, to the last bit that a file in mm keeps
     support = np.asarray(after.metadata["_ply_raw"]["vertex"]["data"]["support"]).ravel()
     untouched = np.round(np.asarray(after.vertices)[support == 0], 9)
     table = np.round(points[points[:, 0] > 40], 9)

@@ -1,8 +1,8 @@
 """Every block of README.md and docs/*.md runs, or says before it why not (doc_blocks.py).
 
-Blocks of one page run in order in one folder, which has the inputs that the pages name (doc_inputs.py): `sh` by bash, with `touchup`
-as it was built; `python` in one interpreter that has the wheel, TOUCHUP_PYTHON; a scene is checked by the wheel, a sweep is planned;
-`rust` belongs to cargo test.
+Blocks of one page run in order in one folder, which has the inputs that the pages name (doc_inputs.py): `sh` in bash, with the built
+`touchup`; `python` in one interpreter that has the wheel, TOUCHUP_PYTHON; the wheel checks a scene, `touchup` plans a sweep; `rust` belongs
+to cargo test.
 """
 
 import json
@@ -42,7 +42,7 @@ for line in sys.stdin:
 
 @pytest.fixture(scope="session")
 def inputs(touchup, tmp_path_factory):
-    """Folders with files: of all pages, and of that about calibrations, where the same touches are recorded before any."""
+    """Folders with files: of all pages, and of the one about calibrations, which records the same touches before any calibration."""
     usual, calibration = tmp_path_factory.mktemp("inputs"), tmp_path_factory.mktemp("calibrations")
     make_calibrations(calibration, make_inputs(touchup, usual))
     return {"": usual, "calibration.md": calibration}
@@ -58,7 +58,7 @@ def programs(touchup_bin, tmp_path_factory):
 
 @pytest.fixture
 def folder(inputs, page, tmp_path):
-    """Where the blocks of a page run: inputs, and what pages name of the tree."""
+    """Folder of the blocks of a page: inputs, and the files of the tree that pages name."""
     shutil.copytree(inputs[""], tmp_path, dirs_exist_ok=True)
     if page.name in inputs:
         shutil.rmtree(tmp_path / "my_recording")
@@ -96,7 +96,7 @@ class Page:
     def yaml(self, block):
         read = yaml.safe_load(block.code)
         assert isinstance(read, dict), f"{block}: {read}"
-        # what is for ROS is not for touchup
+        # parameters of ROS are not a scene
         if all(isinstance(of, dict) and "ros__parameters" in of for of in read.values()):
             return
         if "keys" in read:
@@ -107,7 +107,7 @@ class Page:
         self.execute(str(block), "import touchup\ntouchup.check_scene('block.yaml')\n")
 
     def rust(self, block):
-        """Those of a page that is the documentation of the crate are run by cargo test --doc."""
+        """cargo test --doc runs the blocks of a page that is the documentation of the crate."""
         library = (ROOT / "src/lib.rs").read_text(encoding="utf-8")
         assert f'#[doc = include_str!("../{block.page}")]' in library, f"{block}: no test of cargo has this page"
 

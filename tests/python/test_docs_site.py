@@ -1,6 +1,6 @@
-"""The site of the documentation: it builds without a warning, and shows what the forge shows.
+"""The site of the documentation: it builds without a warning, and shows the same as the forge.
 
-mkdocs reads Markdown of its own kind; what CommonMark sees in a page, as forges do, is counted by markdown-it.
+mkdocs reads Markdown of its own kind; markdown-it counts the elements that CommonMark, as on forges, sees in a page.
 """
 
 import collections
@@ -21,7 +21,7 @@ PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").g
 
 
 class Elements(HTMLParser):
-    """Counts elements, and collects what a browser fetches to show a page."""
+    """Counts elements, and collects the addresses that a browser fetches to show a page."""
 
     def __init__(self, text):
         super().__init__()
@@ -40,7 +40,7 @@ class Elements(HTMLParser):
 
 @pytest.fixture(scope="session")
 def site(tmp_path_factory):
-    """The site as it is built, and what mkdocs prints."""
+    """The built site, and the output of mkdocs."""
     folder = tmp_path_factory.mktemp("site")
     command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(folder)]
     built = subprocess.run(command, cwd=ROOT, env={**os.environ, "NO_MKDOCS_2_WARNING": "1"}, capture_output=True, text=True)
@@ -66,7 +66,7 @@ def test_every_public_name_of_the_package_is_on_the_page_of_the_api(site):
     public = package.split("__all__ = [")[1].split("]")[0].replace('"', "").replace(",", "").split()
     assert len(public) > 20
     page = (site / "api.html").read_text(encoding="utf-8")
-    # constants and the scene are named in a sentence
+    # a sentence names constants and the scene
     missing = [name for name in public if not re.search(rf'id="touchup\.(\w+\.)?{name}"|<code>{name}</code>', page)]
     assert missing == []
 

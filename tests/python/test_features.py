@@ -1,6 +1,6 @@
-"""Every number of a feature is followed back to the touches that it names, and these to the messages they came from.
+"""Every number of a feature leads back to the touches that it names, and these to the messages of their origin.
 
-The circles are fitted again by numpy, from those lines of the file of touches alone.
+numpy fits the circles again, from those lines of the file of touches alone.
 """
 
 import csv
@@ -16,9 +16,9 @@ from touch_groups import groups_of
 
 # the plate of the demo: diameters of its holes and its boss, width of its slot, mm
 DRAWN = {"hole": [8.0, 6.0], "boss": [10.0], "slot": [6.0]}
-# what a fit without the program's correction for curvature may differ by, mm
+# largest difference to a fit without the program's correction for curvature, mm
 AGREE_MM = 0.001
-# a number is fitted to at least so many
+# least number of touches behind a number
 LEAST_TOUCHES = 12
 
 Demo = namedtuple("Demo", "features touches stamps")
@@ -130,7 +130,7 @@ def test_a_width_is_that_of_the_touches_it_names(demo):
         walls.append(np.average(centres[wall] @ side, weights=weights[wall] ** 2))
     width = walls[0] - walls[1] + 2 * 1.5
     print(f"slot: {slot['width_mm']:.4f}, from its touches {width:.4f} mm")
-    # the ends, which the program fits too, are left out here
+    # without the ends, which the program fits too
     assert width == pytest.approx(slot["width_mm"], abs=2 * AGREE_MM)
 
 
@@ -152,7 +152,7 @@ def test_only_what_was_touched_names_touches(demo):
         for number in ("diameter_mm", "width_mm"):
             assert number not in feature.get("touches", {}) or is_touched
         assert not is_touched or (feature["touched"] > 0 and feature["touches"]["center_mm"])
-        # an edge between a plane that was touched and one that was not names those of the first
+        # an edge between a touched and an untouched plane names touches of the first
         assert is_touched or feature["kind"] in ("edge", "corner") or "touches" not in feature
 
 

@@ -1,8 +1,8 @@
 """Form and relations of features, computed again by SciPy from the touches that the file names.
 
-Known errors are put into the touches of the demo: the through-hole gets three lobes, the blind hole leans. `touchup features` measures
-these touches on the refined mesh; circles, cylinders and narrowest zones are fitted here by other means: least squares by LAPACK, the minimum
-zone as a linear programme of HiGHS.
+The touches of the demo get known errors: the through-hole gets three lobes, the blind hole leans. `touchup features` measures these touches
+on the refined mesh; other means fit circles, cylinders and narrowest zones here: least squares by LAPACK, the minimum zone as a linear
+programme of HiGHS.
 """
 
 import csv
@@ -94,7 +94,7 @@ def test_an_out_of_round_hole_is_found_as_scipy_finds_it(worn):
     zone = narrowest(circle, profile)
     std = form["std"]["roundness_mm"]
     print(f"roundness {form['roundness_mm']:.4f} ± {std:.4f}, SciPy {zone:.4f}; least squares {form['least_squares']['roundness_mm']:.4f}, NumPy {np.ptp(about):.4f} mm")
-    # the bias of noise, which is taken off there and not here, is a part of the uncertainty
+    # the bias of noise, which the program subtracts and this test does not, is a part of the uncertainty
     assert form["roundness_mm"] == pytest.approx(zone, abs=std / 2)
     assert form["least_squares"]["roundness_mm"] == pytest.approx(np.ptp(about), abs=std / 2)
     assert abs(form["roundness_mm"] - 2 * LOBE) < 3 * std < LOBE

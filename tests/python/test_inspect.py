@@ -103,7 +103,7 @@ def test_forms_conform_as_a_normal_distribution_cut_at_zero(touchup, tmp_path):
 
 
 class Page(html.parser.HTMLParser):
-    """What a page asks for, and its text."""
+    """Addresses that a page asks for, and its text."""
 
     def __init__(self):
         super().__init__()
@@ -210,7 +210,7 @@ def test_the_report_prints_to_pdf(plate, tmp_path):
 
 
 ROUND, LONG = ["hole", "boss", "cylinder", "notch"], ["slot", "pocket"]
-# kinds of features by quantity, as docs/inspect.md has them; the quantities of every kind are added
+# kinds of features by quantity, as in docs/inspect.md, plus the quantities of every kind
 KINDS = dict.fromkeys(["diameter_mm", "roundness_mm", "cylindricity_mm", "straightness_mm"], ROUND) | {
     "width_mm": LONG,
     "length_mm": [*LONG, "edge", "cylinder"],
@@ -232,7 +232,7 @@ def every_characteristic(tolerances):
         is_zone = is_zone or quantity in ("roundness_mm", "cylindricity_mm", "straightness_mm", "position_mm")
         for kind in kinds:
             for number, tolerance in enumerate(tolerances[-1:] if is_zone else tolerances):
-                # the first is measured, no feature has the numbers of the others
+                # the first one has a measured value, no feature has the numbers of the others
                 one = {"name": f"{kind} {quantity} <{number}>", "kind": kind, "quantity": quantity}
                 one |= {"feature": EVERY.index(kind) + 10 * number, "center_mm": [0.1 * number, 0, 0]}
                 one |= {f"{name}_{unit}": value for name, value in tolerance.items()}
@@ -245,7 +245,7 @@ def every_characteristic(tolerances):
 
 @pytest.fixture(scope="session")
 def qif_errors(shared):
-    """A function of a file: what the schema of QIF 3.0 finds wrong in it."""
+    """A function of a file: its errors against the schema of QIF 3.0."""
     folder = shared / "data/qif"
     schema = lxml.etree.XMLSchema(lxml.etree.parse(folder / "QIFApplications/QIFDocument.xsd"))
     assert schema.validate(lxml.etree.parse(folder / "nist/nist_ctc_01_asme1_ap242.qif")), schema.error_log
@@ -304,7 +304,7 @@ def test_nothing_is_decided_on_a_mesh_alone_and_the_missing_touches_are_named(to
     assert ran.returncode == 4
     measured = [one for one in json.loads(ran.stdout)["characteristics"] if "actual_mm" in one]
     assert {one["decision"] for one in measured} == {"undecided"}
-    # the uncertainty of the mesh is told all the same
+    # the table gives the uncertainty of the mesh all the same
     assert sum("standard_uncertainty_mm" in one for one in measured) >= 5
     (bore,) = [one for one in measured if one["name"] == "through-hole diameter"]
     assert "no touches behind it" in bore["reason"] and "12 touches near (" in bore["reason"]

@@ -26,7 +26,7 @@ PLATE = [
 
 
 def measured(part, motion, noise=0.0, seed=1):
-    """What touching finds of the part where it lies: the inverse of the motion, and errors of the stated size."""
+    """Features that touching finds of the part in its place: the inverse of the motion, and errors of the stated size."""
     turn, shift = motion
     rng = np.random.default_rng(seed)
     features = []
@@ -136,7 +136,7 @@ def test_a_best_fit_and_its_uncertainties_are_those_of_scipy(touchup, tmp_path):
     stds = np.sqrt(np.diag(covariance))
     assert np.allclose(found["translation_std_mm"], stds[:3], rtol=1e-3)
     assert np.allclose(np.radians(found["rotation_std_deg"]), stds[3:], rtol=1e-3)
-    # what a feature says of the frame it does not say of itself
+    # the share of a feature in the frame is no error of its own
     left = np.eye(len(best.fun)) - best.jac @ covariance @ best.jac.T
     at, checked = 0, 0
     for one, (name, kind, *_) in zip(features, PLATE, strict=True):
@@ -191,7 +191,7 @@ def test_a_drawing_that_was_moved_gives_the_same_decisions_and_a_report_that_say
         assert one["standard_uncertainty_mm"] == pytest.approx(other["standard_uncertainty_mm"], rel=1e-6)
     decisions = {one["name"]: one["decision"] for one in moved["characteristics"]}
     assert [name for name, decision in decisions.items() if decision != "pass"] == ["blind hole diameter", "slot width"]
-    # the plate lies in the scan as it is drawn, and is found there as well as it was touched
+    # the plate lies in the scan as drawn, and alignment finds it there to the accuracy of its touches
     found = still["alignment"]
     assert np.abs(found["rotation_vector_deg"]).max() < 0.05 and found["residual_max_mm"] < 0.03
     turned = np.array(moved["alignment"]["rotation"])
@@ -203,7 +203,7 @@ def test_a_drawing_that_was_moved_gives_the_same_decisions_and_a_report_that_say
     assert attributes["touchup.frame"] == "drawing by best-fit"
     motion = [[float(x) for x in row.split()] for row in attributes["touchup.mesh_to_drawing"].split(";")]
     assert np.abs(np.array(motion)[:, :3] - turned).max() < 1e-12
-    # and without it nothing of it is found
+    # and without it alignment finds nothing
     ran = touchup("inspect", demo_folder / "features.json", "--nominal", tmp_path / "1/n.csv", "--json")
     assert {one["decision"] for one in json.loads(ran.stdout)["characteristics"]} == {"undecided"}
 
@@ -218,7 +218,7 @@ def square(turn=0.0):
 def test_what_cannot_be_aligned_is_one_error_that_says_what_to_do(touchup, tmp_path):
     best = ("--align", "best-fit")
     features = measured(PLATE, MOTION)
-    # turns of a square are as good as one another, unless its bores are named
+    # turns of a square are as good as one another, unless the drawing names its bores
     error = refused(touchup, tmp_path, measured(square(), MOTION), rows_of(square()), *best)
     assert "the pattern is symmetric" in error and "column feature" in error, error
     named = aligned(touchup, tmp_path, measured(square(), MOTION), rows_of(square(), ids=True), *best)
@@ -286,7 +286,7 @@ def test_a_cad_mesh_in_a_frame_of_its_own_is_found_by_its_features(touchup, demo
     decisions = [{(one["feature"], one["quantity"]): one["decision"] for one in record["characteristics"]} for record in records]
     assert decisions[0] == decisions[1] and "pass" in decisions[0].values()
     assert any(quantity == "position_mm" for _, quantity in decisions[0])
-    # the scan of the demo lies as its plate does: the motion is the one that the drawing was moved by, as well as it was touched
+    # the scan of the demo lies as its plate does: the motion is that of the drawing, to the accuracy of its touches
     found = moved["alignment"]
     turn = Rotation.from_matrix(found["rotation"]) * MOTION[0].inv()
     middle = MOTION[0].inv().apply(np.array(found["center_mm"]) - MOTION[1])

@@ -1,8 +1,8 @@
-"""What a scan gains by a recording, measured by the judge on its cases.
+"""Gain of a scan from a recording, measured by the judge on its cases.
 
-The judge shares no code with touchup and the cases come from another simulator. Only the scan, the recording, and the
-ball's radius and stiffness go into touchup; the truth is read by the judge alone. The quick checks judge one part, with
-libigl behind the judge; with TOUCHUP_FULL all cases are judged with open3d, and their tables go into docs/results.md.
+The judge shares no code with touchup and the cases come from another simulator. Only the scan, the recording, and the ball's radius and
+stiffness go into touchup; the judge alone reads the truth. The quick checks judge one part, with libigl behind the judge; with TOUCHUP_FULL
+open3d judges all cases, and their tables go into docs/results.md.
 """
 
 import functools
@@ -24,30 +24,30 @@ KNOWN = ["--mesh-unit", "mm", "--tip-radius-mm", "1.5", "--stiffness-n-per-mm", 
 DIRECTIONS = ["truth_to_mesh", "mesh_to_truth"]
 # the judge measures in single precision: half a rounding of a coordinate of 128 mm on each of three axes, mm
 UNCHANGED_MM = 3**0.5 * 128 * 2**-24
-# vertices are compared in double precision: a few roundings of 128 mm on the way to metres and back, mm
+# vertices compare in double precision: a few roundings of 128 mm on the way to metres and back, mm
 UNMOVED_MM = 4 * 128 * 2**-52
 # beyond this the judge counts a place as not touched, mm
 FAR_MM = 6
 # both baselines that throw the scan's mesh away, of which the better counts in each column
 OFFLINE = ["poisson", "carve"]
-# what a hard case may be worse than the baselines on the std one
+# permitted factor of a hard case over the baselines on the std one
 HARD = 1.5
-# share of the openings of holes that may stay covered where the baselines are better
+# share of the openings of holes that may stay covered if the baselines are better
 COVERED = 0.02
-# share of the scanned or touched surface that may be lost
+# permitted loss of the scanned or touched surface, as a share
 LOST = 0.005
 # faces of the result for each of the scan
 FACES = 10
-# faces that may be turned over beyond the scan's own: the aim, none, is missed by five on the plate, by four on the featuretype
+# permitted inverted faces beyond the scan's own: the aim is none, the plate has five, the featuretype four
 FLIPPED = 5
-# a rim may be so much longer than the scan's own and the ends of the through-holes, as the lattice cuts it, mm
+# permitted excess of a rim over the scan's own and the ends of the through-holes, as the lattice cuts it, mm
 RIM_SLACK_MM = 5.0
 # holes and slots that the judge requires: those that the ball fits and touched
 REQUIRED = {"plate": (1, 0), "flange": (6, 0), "featuretype": (4, 2)}
-# the issue allows center and size to be off by so much, of the flange by more: its holes are polygons, mm
+# permitted errors of center and size by the issue, for the flange larger: its holes are polygons, mm
 ALLOWED_MM = {"plate": 0.1, "flange": 0.2, "featuretype": 0.1}
-# what they may be off by at most, mm: center and size, by what is measured (0.003 and 0.045, 0.007 and 0.039, 0.014 and
-# 0.166, 0.023 and 0.157, 0.004 and 0.030, 0.019 and 0.028, 0.001 and 0.032) with room for another seed
+# largest errors, mm: center and size, by measurement (0.003 and 0.045, 0.007 and 0.039, 0.014 and 0.166, 0.023 and 0.157, 0.004 and 0.030,
+# 0.019 and 0.028, 0.001 and 0.032) with room for another seed
 OFF_MM = {
     "plate": (0.02, 0.06),
     "plate_hard": (0.03, 0.06),
@@ -57,9 +57,8 @@ OFF_MM = {
     "featuretype_hard": (0.04, 0.05),
     "featuretype_clean": (0.005, 0.05),
 }
-# share of the touched edges that is found at least, and of the found ones that is true, where the judge lists edges;
-# measured: 0.537 and 0.863, 0.828 and 0.906, 0.752 and 0.878, 0.526 and 0.867, 0.687 and 0.809; a rounding of the mesh
-# changes these by up to 0.045
+# least found share of the touched edges, and least true share of the found ones, for cases with edges in the judge's list; measured: 0.537
+# and 0.863, 0.828 and 0.906, 0.752 and 0.878, 0.526 and 0.867, 0.687 and 0.809; a rounding of the mesh changes these by up to 0.045
 EDGES = {
     "plate": (0.48, 0.8),
     "plate_hard": (0.7, 0.8),
@@ -75,7 +74,7 @@ Judged = namedtuple("Judged", "summary scan refined folder mesh")
 
 
 def loaded(*folders):
-    """The judge as a module, with what lies in the folders before all else."""
+    """The judge as a module, with the contents of the folders before all else."""
     for name in ("judge", "common", "open3d"):
         sys.modules.pop(name, None)
     sys.path[:0] = map(str, folders)
@@ -202,7 +201,7 @@ def flipped(verdict):
 
 
 def columns_of(verdict):
-    """The columns of the baselines' table that a case is compared in."""
+    """Columns of the baselines' table that a case compares in."""
     t2m, m2t = (touched(verdict, direction) for direction in DIRECTIONS)
     return {
         "t2m mean": t2m["mean"],
@@ -295,10 +294,10 @@ def test_nothing_intersects_itself(judged, moved, case):
 
 @pytest.mark.full
 def test_the_quick_judge_says_what_the_judge_says(judge, judged):
-    """libigl in place of open3d: every distance, share and count, and the face that a normal is taken of.
+    """libigl in place of open3d: every distance, share and count, and the face that gives a normal.
 
-    Where a place is as near to two faces, as beside an edge, either of them is right, and angles between normals are as far apart
-    as those faces are: so the test checks that the named faces are nearest, not which of several.
+    If a place is as near to two faces, as beside an edge, either of them is right, and angles between normals differ by the angle of those
+    faces: so the test checks that the named faces are nearest, not which of several.
     """
     folder, mesh = str(judged["plate"].folder), str(judged["plate"].mesh)
     whole, quick = loaded(judge.parent), loaded(ON_LIBIGL, judge.parent)

@@ -1,7 +1,8 @@
-"""Random machined parts of an independent solid modeller: every feature of the drawing is found, and of touched parts what was touched.
+"""Random machined parts of an independent solid modeller: touchup finds every feature of a drawing, and every touched feature of touched
+parts.
 
-The truth comes from the tools that cut the parts, not from any mesh. A drawing's features do not depend on the order of its faces, on
-where it lies, nor on how finely it is tessellated.
+The truth comes from the tools that cut the parts, not from any mesh. A drawing's features do not depend on the order of its faces, on its
+pose, nor on the fineness of its tessellation.
 """
 
 import json
@@ -19,12 +20,12 @@ from machined.judge import KINDS, described, judge
 from machined.touched import WORLDS, Totals, part_run
 from scipy.spatial.transform import Rotation
 
-# none of these seeds was looked at while the program was written
+# development looked at none of these seeds
 SEEDS = range(1000, 1060 if IS_FULL else 1018)
 TOUCHED_SEEDS = range(2000, 2008)
-# share of the features of a drawing that is found at least: holes across shafts whose tessellation is long and thin are missed now and then
+# least found share of the features of a drawing: holes across shafts of long and thin tessellation fail now and then
 FOUND = 0.97
-# what a size of a drawing may be off: polygons lie this far from the circle that they stand for, mm
+# permitted error of a size of a drawing: polygons lie this far from their circle, mm
 OFF_MM = 0.02
 # the same size in another tessellation, mm
 SAME_MM = 0.1
@@ -41,7 +42,7 @@ def drawn_features(touchup, mesh, folder):
 
 @pytest.fixture(scope="module")
 def drawings(touchup, tmp_path_factory):
-    """Of each seed the family, the part, its mesh, and the features that are found in it."""
+    """Of each seed the family, the part, its mesh, and its found features."""
     folder = tmp_path_factory.mktemp("drawn")
 
     def drawn(seed):
@@ -86,7 +87,7 @@ def alike(one, other):
 @pytest.mark.parametrize("change", ["shuffled", "turned", "subdivided"])
 def test_features_of_a_drawing_are_the_same(touchup, drawings, tmp_path, change):
     different = []
-    # of each family, but for shafts: their long facets may be parted otherwise
+    # of each family, but for shafts: their long facets may separate differently
     seeds = [seed for seed, (family, *_) in drawings.items() if family != "shaft"][: None if IS_FULL else 8]
     for seed in seeds:
         _, _, mesh, found = drawings[seed]

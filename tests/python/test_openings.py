@@ -1,4 +1,4 @@
-"""The form of openings in a drawing that are no circles; parts are cut by manifold3d."""
+"""The form of openings in a drawing that are no circles; manifold3d cuts the parts."""
 
 import json
 import math

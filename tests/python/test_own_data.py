@@ -1,6 +1,6 @@
-"""Recordings of others, made by independent writers, are read as they were written: `touchup convert` makes MCAP of them.
+"""Recordings of independent writers read as written: `touchup convert` makes MCAP of them.
 
-The values of the messages are drawn at random; what touchup wrote is read again by rosbags, and compared with what was written here.
+The values of the messages are random; rosbags reads touchup's output again, and the test compares it with its own input.
 """
 
 import csv
@@ -31,7 +31,7 @@ def values(count, seed=1):
 
 
 def converted(touchup, tmp_path, source, *flags):
-    """Poses and wrenches of what `touchup convert` makes, and what it prints."""
+    """Poses and wrenches in the output of `touchup convert`, and its printed text."""
     out = tmp_path / "converted.mcap"
     done = touchup("convert", source, "--out", out, "--json", *flags)
     assert done.returncode == 0, done.stderr
@@ -191,7 +191,7 @@ def test_a_pose_is_taken_from_a_tree_of_transforms(touchup, tmp_path, kind):
         ],
     )
     stamped = [messages.of("geometry_msgs/msg/WrenchStamped", header=messages.header(t, "tool0"), wrench=messages.wrench(w)) for t, w in zip(stamps, wrenches)]
-    # what stays comes late, as from a recorder that began before its publisher
+    # the static transforms come late, as from a recorder that began before its publisher
     topics = [
         ("/tf", name, list(zip(stamps, moving))),
         ("/tf_static", name, [(stamps[3], fixed)]),
@@ -386,7 +386,7 @@ def test_the_state_of_franka_ros2_holds_pose_and_wrench_each_with_its_frame(touc
 
 
 def test_touches_and_features_are_the_same_as_csv_and_as_parquet(touchup, demo_folder, tmp_path):
-    """pyarrow reads the types, pandas the text; both against what json and csv of Python read from the files themselves."""
+    """pyarrow reads the types, pandas the text; both against Python's json and csv on the files themselves."""
     for name in ["touches.csv", "features.json"]:
         tables = []
         for ending in ["csv", "parquet"]:
@@ -395,7 +395,7 @@ def test_touches_and_features_are_the_same_as_csv_and_as_parquet(touchup, demo_f
             assert done.returncode == 0, done.stderr
             tables.append(pandas.read_csv(out) if ending == "csv" else parquet.read_table(out).to_pandas())
             assert json.loads(done.stdout)["rows"] == len(tables[-1])
-        # what is not there is NaN in the one and None in the other
+        # a missing value is NaN in the one and None in the other
         same = [table.astype(object).where(table.notna(), None) for table in tables]
         pandas.testing.assert_frame_equal(*same, check_dtype=False)
     touches = parquet.read_table(tmp_path / "touches.csv.parquet")
@@ -418,7 +418,7 @@ def test_touches_and_features_are_the_same_as_csv_and_as_parquet(touchup, demo_f
 
 
 def test_a_recording_that_became_a_table_comes_back_to_the_last_bit(touchup, demo_folder, tmp_path):
-    """Written by pandas with all digits, poses and wrenches one below the other as they were recorded."""
+    """Written by pandas with all digits, poses and wrenches one below the other in the order of the recording."""
     columns = {
         POSE: ["x_m", "y_m", "z_m", "qx", "qy", "qz", "qw"],
         WRENCH: ["fx_N", "fy_N", "fz_N", "tx_Nm", "ty_Nm", "tz_Nm"],

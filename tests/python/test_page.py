@@ -1,5 +1,6 @@
-"""The operator's page in a real browser: its picture against rays that are cast onto the saved mesh, live changes, lost connections,
-roles, holding a button for an arm to move, and what axe-core finds."""
+"""The operator page in a real browser: its picture against rays cast onto the saved mesh, live changes, lost connections, roles, holding a
+button for an arm to move, and the findings of axe-core.
+"""
 
 import io
 import json
@@ -61,7 +62,7 @@ def call(page, service, /, **request):
 
 
 def saved_at_rest(page, node):
-    """Saves the mesh as seen.ply when it rests, which then is what every follower has; the answer."""
+    """Saves the mesh as seen.ply at rest, when every follower has the same; returns the answer."""
 
     def save():
         return call(page, "~/save_mesh", name="seen.ply", overwrite=True)["response"]
@@ -83,7 +84,7 @@ def test_the_picture_is_that_of_the_saved_mesh_in_its_colours(browser, touched):
     page.get_by_role("button", name="Whole part").click()
     # the line that says that no samples come any more moves the picture when it appears
     page.locator(".remedy").wait_for()
-    # what lies over the picture is no matter of the mesh
+    # overlays of the picture do not belong to the mesh
     page.evaluate("document.querySelectorAll('.picture > :not(canvas)').forEach((each) => (each.style.display = 'none'))")
     shot, box = picture(page)
     mesh = trimesh.load(touched.session / "seen.ply", process=False)
@@ -159,7 +160,7 @@ def test_holes_and_bosses_are_listed_with_value_and_expanded_uncertainty_as_the_
                     digits = [len(number.partition(".")[2]) for number in (read[2], read[3])]
                     assert digits[0] == digits[1], row
                     shown[int(read[1])] = (float(read[2]), float(read[3]), 10.0 ** -digits[0])
-            # to the last digit that is shown, the uncertainty rounded up
+            # to the last shown digit, with the uncertainty rounded up
             both = [(*shown[one], *known[one]) for one in shown.keys() & known.keys()]
             near = [abs(value - true) < 0.51 * last and -1e-6 < u - true_u < last for value, u, last, true, true_u in both]
             # features come one after the other: the boss of the plate of the demo is among them
@@ -223,7 +224,7 @@ def on_screen(camera, points):
 
 
 def touched_place(page, follower, seed):
-    """A place of the picture where a touched vertex is seen, and nothing lies over it; with that vertex, m."""
+    """A place of the picture that shows a touched vertex without an overlay; with that vertex, m."""
     touched = [vertex for vertex, support in follower.support.items() if support == 1]
     places = numpy.array([follower.vertices[vertex] for vertex in touched])
     order = numpy.random.default_rng(seed).permutation(len(places))
@@ -237,7 +238,7 @@ def touched_place(page, follower, seed):
 
 
 def is_red(page, points):
-    """Of places of the part, which are drawn in the colour of a touch that may go."""
+    """Whether each place of the part has the colour of a removable touch in the picture."""
     pixels = on_screen(page.evaluate("touchup.camera()"), points)
     seen = numpy.array([page.evaluate("([x, y]) => touchup.pixel(x, y)", [x, y])[:3] for x, y in pixels.tolist()])
     return (seen[:, 0] > 150) & (seen[:, 1:].max(1) < 90)
@@ -259,7 +260,7 @@ def test_a_touch_behind_a_tapped_place_is_shown_and_goes_and_comes(browser, touc
         follower.take_until(lambda: follower.version >= page.evaluate("touchup.version()"))
         for seed in range(50):
             x, y, place = touched_place(page, follower, seed)
-            # what the node says of it, by another way than the page
+            # the node's answer, by another way than the page
             point = {"header": {"frame_id": "object"}, "point": dict(zip("xyz", place, strict=True))}
             asked = {"point": point, "preview": True}
             found = follower.call("~/take_out_touch", **asked)["response"]
@@ -280,7 +281,7 @@ def test_a_touch_behind_a_tapped_place_is_shown_and_goes_and_comes(browser, touc
     page.evaluate("touchup.idle()")
     assert not is_red(page, contacts).any()
 
-    # who only looks may open the menu of a place, and is offered nothing
+    # an onlooker may open the menu of a place, and gets no offer
     looking = page_of(browser, touched, role="look")
     looking.locator(".remedy").wait_for()
     looking.evaluate("touchup.idle()")

@@ -1,9 +1,8 @@
 """`touchup refine --mode paper` against the published rule written out.
 
-Per sample: the face with the closest barycentre (Eq 12), the tip against its plane (Eq 1-3), b* and n* carried over the held
-sample by an integrator of SciPy (Eq 6, 7), the corners of the face moved with them, and the one-ring around it after them by
-Laplacian surface editing with uniform weights, as a dense linear system (Sec 4.3). Nothing is shared with the program: no closed
-form, no tree, no sparse solver.
+Per sample: the face with the closest barycentre (Eq 12), the tip against its plane (Eq 1-3), b* and n* carried over the held sample by an
+integrator of SciPy (Eq 6, 7), the corners of the face moved with them, and the one-ring around it after them by Laplacian surface editing
+with uniform weights, as a dense linear system (Sec 4.3). It shares nothing with the program: no closed form, no tree, no sparse solver.
 
 The program comes from the environment variable TOUCHUP_BIN, or target/release/touchup.
 """

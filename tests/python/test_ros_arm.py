@@ -1,7 +1,7 @@
-"""`touchup node` with an arm, over CycloneDDS: flagged features are probed by service and action, cancelled, and shown.
+"""`touchup node` with an arm, over CycloneDDS: service and action probe flagged features, cancel, and publish them.
 
-Once with the simulated arm, once with the real ur-rtde against the stand-in for a controller. Which ends how is compared with the
-drawing of the plate.
+Once with the simulated arm, once with the real ur-rtde against the stand-in for a controller. The drawing of the plate gives the expected
+endings.
 """
 
 import contextlib
@@ -62,7 +62,7 @@ DEADLINE_S = 300
 
 
 def free_address():
-    """A loopback address whose ports of a controller, which ur-rtde has fixed, are unused."""
+    """A loopback address with free ports of a controller; ur-rtde has fixed ones."""
     for number in range(2, 250):
         address = f"127.0.1.{number}"
         with contextlib.ExitStack() as sockets:
@@ -77,7 +77,7 @@ def free_address():
 
 @contextlib.contextmanager
 def controller():
-    """The stand-in for a controller; its address. Its clock waits for the client, which must be configured for this."""
+    """The stand-in for a controller; its address. Its clock waits for the client, whose configuration must allow this."""
     address = free_address()
     command = [os.environ["TOUCHUP_UR_CONTROLLER"], address, "--start-mm", "20,30,60"]
     with Running(command) as process:
@@ -120,7 +120,7 @@ def running(robot, demo_folder, folder, program):
             assert report["lost"] == report["dropped"] == [0, 0] and report["unrecorded"] == 0, report
 
 
-# ur-rtde is installed for it by the slow proofs
+# the slow proofs install ur-rtde for it
 ROBOTS = ["sim", "ur"] if os.environ.get("TOUCHUP_FULL") else ["sim"]
 
 
@@ -150,13 +150,13 @@ class Cell:
         self.node.wait_for(condition, deadline_s)
 
     def ask(self, name, kinds, *fields, harmless=None):
-        """Asks once. Before the first time it asks something harmless until that is answered: then both sides know each other."""
+        """Asks once. Before the first time it repeats something harmless until an answer: then both sides know each other."""
         if name not in self.clients:
             self.clients[name] = self.peer.client(f"/touchup/{name}", *kinds)
             self.repeat(self.clients[name], kinds[0], fields if harmless is None else harmless)
             if harmless is None:
                 return self.found
-            # of what was asked more than once the last may still be worked at
+            # the last of several repeated orders may still run
             if name in ORDERS:
                 self.wait_for(lambda: "works at an order" not in self.trigger("arm_state").message)
         writer, reader = self.clients[name]
@@ -308,8 +308,8 @@ def test_a_cancelled_goal_stops_the_next_is_taken_up_and_after_a_stop_nothing_is
     feedback = cell.peer.reader("/touchup/probe/_action/feedback", FeedbackMessage, RELIABLE)
     name = [40] * 16
     assert cell.cancel([41] * 16) == 2, "this goal is unknown"
-    # both sides know each other before anything moves: recovering an arm that nothing stopped changes nothing. The first call is
-    # repeated until it is answered, and may find the arm at work at the one before
+    # both sides know each other before any motion: recovering an arm without a stop changes nothing. The first call repeats until its
+    # answer, and may find the arm at work at the one before
     cell.wait_for(lambda: cell.trigger("recover").success)
     assert cell.send_goal(name, [through, blind])
     has_touched(cell, feedback, name, 3)

@@ -13,7 +13,7 @@ def test_the_golden_bytes_are_those_of_the_files_in_msg():
 
 
 def test_no_two_fields_of_a_message_are_alike():
-    """Otherwise two that changed places would not be seen."""
+    """Otherwise an exchange of two fields would stay unseen."""
 
     def numbers(value):
         if isinstance(value, dict):
@@ -28,7 +28,7 @@ def test_no_two_fields_of_a_message_are_alike():
 
 
 def test_the_standard_definitions_are_those_of_ros():
-    """Fields and constants below crates/touchup-node/src/ros/messages/standard; of Marker constants that are old or not used are left out."""
+    """Fields and constants below crates/touchup-node/src/ros/messages/standard, without old and unused constants of Marker."""
     store = get_typestore(Stores.ROS2_JAZZY)
     left_out = {"MODIFY", "ARROW_STRIP"}
     for path in (ROOT / "crates/touchup-node/src/ros/messages/standard").glob("*/*.msg"):

@@ -1,4 +1,4 @@
-"""The port on DDS against CycloneDDS: what ROS 2 nodes with rmw_cyclonedds put on the wire.
+"""The port on DDS against CycloneDDS, which puts the bytes of ROS 2 nodes with rmw_cyclonedds on the wire.
 
 The other end is the example ros_echo: wrench in, mismatch out, tiles latched, calls answered.
 """
@@ -94,10 +94,10 @@ def next_of(echo, reader):
 
 
 class Client:
-    """Calls a service: the first time until it is answered, then once.
+    """Calls a service: the first time until an answer, then once.
 
-    A reader that knows a writer and has no heartbeat of it yet takes what comes with the first one for older than itself: where that answer
-    is lost, none is sent again.
+    A reader that knows a writer without a heartbeat takes anything before the first one for older than itself: if that answer is lost, no
+    other comes.
     """
 
     def __init__(self, echo, peer, name, request, response):
@@ -116,7 +116,7 @@ class Client:
             if not asked or (self.calls == 1 and time.monotonic() > asked + AGAIN_S):
                 asked = time.monotonic()
                 self.writer.write(self.request(CALLER, self.calls, *fields))
-            # the first one may have been answered more than once
+            # the first one may have several answers
             answers.extend(answer for answer in self.reader.take(10) if answer.seq == self.calls)
             return answers
 
@@ -327,10 +327,10 @@ def test_an_action_is_taken_up_goes_on_and_ends(domain):
         assert get_result(unknown).status == 0
         assert cancel_goal(GoalInfo(unknown, Time(0, 0))).return_code == 2
 
-        # as with the answers of a service: what comes before the first heartbeat is passed over
+        # as with the answers of a service: the reader skips everything before the first heartbeat
         others = itertools.count()
         echo.wait_for(lambda: send_goal([*divmod(next(others), 256), *range(14)], [7], SETTINGS).accepted and feedback.take(1))
-        # a goal without features is refused by the echo, and may be sent again
+        # the echo refuses a goal without features, so the test may repeat it
         assert not send_goal(done, [], SETTINGS).accepted
         accepted = send_goal(done, [7, 8], SETTINGS)
         assert accepted.accepted and accepted.stamp.sec > 1_700_000_000

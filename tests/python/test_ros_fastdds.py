@@ -1,4 +1,4 @@
-"""The port on DDS against Fast DDS at its default buffers: what ROS 2 nodes with rmw_fastrtps put on the wire."""
+"""The port on DDS against Fast DDS at its default buffers, which puts the bytes of ROS 2 nodes with rmw_fastrtps on the wire."""
 
 import subprocess
 from pathlib import Path
@@ -25,7 +25,7 @@ def domain():
 
 
 class Services:
-    """Clients of the services of parameters, made when they are asked."""
+    """Clients of the services of parameters, made at the first request."""
 
     def __init__(self, fast_dds, echo, domain, wrapper=()):
         self.make = lambda name, kind: fast_dds.client(echo, domain, f"/touchup/{name}", f"rcl_interfaces/srv/{kind}", wrapper)
@@ -51,9 +51,10 @@ def smallest_packet():
 
 
 def parameters_are_listed_dumped_and_described(fast_dds, echo, domain, wrapper=(), packet=None):
-    """As `ros2 param list`, `dump` and `describe` ask, of all at once; what does not fit fails with words. `packet`: the smallest of the
-    networks of the node, if not this one's."""
-    # the answers are as large as docs/ros.md has them; a list that is larger by up to 64 bytes is parted by IP
+    """As `ros2 param list`, `dump` and `describe` ask, of all at once; an answer that does not fit fails with words. `packet`: the smallest
+    of the networks of the node, if not this one's.
+    """
+    # the answers have the sizes of docs/ros.md; IP splits a list larger by up to 64 bytes
     room = (packet or smallest_packet()) - 192
     is_dumped, is_described, has_words = room + 64 >= 1168, room + 64 >= 1124, room >= 1280
     with Services(fast_dds, echo, domain, wrapper) as services:
@@ -78,7 +79,7 @@ def parameters_are_listed_dumped_and_described(fast_dds, echo, domain, wrapper=(
         at_once = {one.name: one for one in services.describe_parameters(names=names).descriptors}
         print("describe_parameters of all:", services.describe_parameters.bytes, "bytes")
         assert list(at_once) == (names if is_described else []) and not any(one.description for one in at_once.values())
-        # the words to choose from where there is room for them
+        # the words to choose from, if there is room for them
         words = "none, sim, ur, ros2_control" if has_words or not is_described else ""
         described |= at_once
         assert (described["stale_ms"].floating_point_range[0].to_value, described["robot"].additional_constraints) == (10_000.0, words)
@@ -89,10 +90,10 @@ def parameters_are_listed_dumped_and_described(fast_dds, echo, domain, wrapper=(
         assert not echo.has(TOO_LARGE, '"~/get_parameters"')
         assert len(services.get_parameters(names=(2 if is_dumped else 1) * names).values) == 0
         echo.wait_for(lambda: echo.has(TOO_LARGE, '"~/get_parameters"', "fewer names"))
-        # and the next is answered as ever
+        # and the next call gets its answer as ever
         assert len(services.get_parameters(names=parts[-1]).values) == len(parts[-1])
 
-        # the results are reported even where the reasons do not fit
+        # the results arrive even if the reasons do not fit
         store = fast_dds.store
         lists = [numpy.array([], dtype=kind) for kind in ("uint8", "bool", "int64", "float64")]
         value = store.types["rcl_interfaces/msg/ParameterValue"](4, False, 0, 0.0, "a" * 500, *lists, [])
@@ -207,7 +208,7 @@ def test_the_wrong_mapping_is_reported(fast_dds, domain):
 
 
 def test_loopback_is_network_enough(fast_dds, domain):
-    """In a network namespace of its own, where there is nothing but lo."""
+    """In a network namespace of its own, with lo alone."""
     inside = ["unshare", "--user", "--map-root-user", "--net"]
     if subprocess.run([*inside, "true"], capture_output=True).returncode:
         pytest.skip("needs network namespaces: sysctl kernel.unprivileged_userns_clone=1, or root")

@@ -1,7 +1,7 @@
 """The launch files and the frames that they start, for each combination of their arguments.
 
-`launch` and `launch_ros` come with ROS alone: stand_ins/ has what the files use of them, with the keywords of the real ones
-and no others. xacro is the real one, and Debian's check_urdf reads what it makes.
+`launch` and `launch_ros` come with ROS alone: stand_ins/ has the parts of them that the files use, with the keywords of the real ones and
+no others. xacro is the real one, and Debian's check_urdf reads its output.
 """
 
 import itertools
@@ -43,7 +43,7 @@ def installation(tmp_path_factory):
 
 
 def launched(file, **arguments):
-    """Nodes that a launch file starts, by name; the radius of the ball is 1.5 mm unless they are told another."""
+    """Nodes that a launch file starts, by name; the radius of the ball is 1.5 mm unless an argument gives another."""
     return visited(file, **arguments)[0]
 
 
@@ -211,7 +211,7 @@ def test_a_replay_starts_the_same_and_the_player():
     nodes = launched("replay.launch.py", recording="touch.mcap", scan="scan.ply", source="stylus")
     assert set(nodes) == {"touchup", "cell_state_publisher", "stylus_state_publisher", "rviz", "replay"}
     assert nodes["replay"].arguments == ["replay", str(Path("touch.mcap").absolute()), "--source", "stylus"]
-    # the result is read after the recording has ended
+    # the result follows the end of the recording
     assert nodes["replay"].on_exit is None
     fast = launched("replay.launch.py", recording="touch.mcap", scan="scan.ply", speed="10")
     assert fast["replay"].arguments[4:] == ["--speed", "10"]

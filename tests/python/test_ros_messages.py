@@ -1,7 +1,7 @@
 """The package touchup_msgs: read, generated and compiled by tools of others, and documented field by field.
 
-Debian's rosidl translates and generates as a ROS build does; rosbags reads the same files by a parser of its own. What
-the messages mirror (kinds, fields of the file of features) is read from the Rust source that defines it.
+Debian's rosidl translates and generates as a ROS build does; rosbags reads the same files by a parser of its own. Mirrored parts of the
+messages (kinds, fields of the file of features) come from the Rust source that defines them.
 """
 
 import os
@@ -18,7 +18,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 PACKAGE = ROOT / "msg"
 FILES = sorted(path.relative_to(PACKAGE) for kind in ("msg", "srv", "action") for path in (PACKAGE / kind).iterdir())
 STAND_INS = ROOT / "tests/python/stand_ins"
-# what generated code includes of other packages
+# includes of other packages in generated code
 STANDARD = {
     "builtin_interfaces": ["Time"],
     "std_msgs": ["Header"],
@@ -50,7 +50,7 @@ def fields(definition):
 
 @pytest.fixture(scope="module")
 def rosidl(tmp_path_factory):
-    """Runs Debian's rosidl: rosidl("generate", package, folder with the files, files, *options) -> folder with what it made."""
+    """Runs Debian's rosidl: rosidl("generate", package, folder with the files, files, *options) -> folder with its output."""
     if not shutil.which("rosidl") or not Path("/usr/share/rosidl_generator_c").is_dir():
         pytest.skip("needs Debian's rosidl: apt-get install rosidl-tools rosidl-generator-c-cpp")
 
@@ -60,7 +60,7 @@ def rosidl(tmp_path_factory):
         environment = {**os.environ, "PYTHONPATH": str(STAND_INS), "AMENT_PREFIX_PATH": "/usr"}
         command = ["rosidl", verb, "-o", str(out), *options, package, *map(str, files)]
         made = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=120)
-        # it ends with 0 when a generator could not be loaded
+        # it ends with 0 even if it could not load a generator
         assert made.returncode == 0 and "Failed" not in made.stderr, made.stderr
         return out
 
@@ -85,7 +85,7 @@ def test_a_wrong_field_name_is_refused(rosidl, tmp_path):
 
 
 def test_generated_c_and_introspection_compile(rosidl, tmp_path):
-    """What r2r consumes; a field named like a keyword of C would end here."""
+    """The input of r2r; a field with a keyword of C as its name would end here."""
     include = tmp_path / "include"
     kinds = ("--type", "c", "--type-support", "introspection_c")
 

@@ -23,7 +23,7 @@ class Viewer(Process):
         self.wait_for(lambda: "ready" in self.out)
 
     def seen(self):
-        """What it has by now."""
+        """Its contents by now."""
         answers = len(self.out)
         self.process.stdin.write("\n")
         self.process.stdin.flush()
@@ -69,12 +69,12 @@ def test_the_node_survives_losses_and_a_breakdown_and_reports_them(demo_folder, 
         report = node.report()
     assert hub.dropped > 0
 
-    # lost messages are reported
+    # the node reports lost messages
     sent = played["wrenches"]
     lost = report["lost"][0]
     assert lost > 0
     taken = report["accepted"] + sum(n for reason, n in report["refused"].items() if not reason.startswith("pose_"))
-    # messages dropped by a busy computer are counted for poses and wrenches together
+    # a busy computer counts dropped messages for poses and wrenches together
     assert 0.99 * sent - report["dropped"][0] <= taken + lost <= sent
     assert any(f"{lost} wrenches lost" in line for line in node.err)
     # and the received samples give the result, as ever

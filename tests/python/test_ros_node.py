@@ -1,4 +1,4 @@
-"""`touchup node` as a process on a network: what it leaves and what others see of it, whatever happens to them."""
+"""`touchup node` as a process on a network: its files and the view of others, after any fault of theirs."""
 
 import contextlib
 import itertools
@@ -90,12 +90,12 @@ def stamps(recording, topic):
 CYCLONE = ["-p", "service_mapping:=cyclone"]
 # a follower that waits for the whole state asks again after eleven of these
 TICK_S = 0.1
-# a disk that refused is asked again
+# after a full disk the test asks again
 ASKS_AGAIN_S = 1.0
 
 
 def in_order(triangles):
-    """Triangles as they are however they and their corners are numbered: places as float32 in m, each from its least corner on."""
+    """Triangles in an order independent of numbering: places as float32 in m, each from its least corner on."""
     turned = numpy.asarray(triangles, numpy.float32).reshape(-1, 3, 3)
     first = numpy.array([min(range(3), key=lambda k: tuple(corners[k])) for corners in turned.tolist()])
     turned = turned[numpy.arange(len(turned))[:, None], (first[:, None] + numpy.arange(3)) % 3].reshape(-1, 9)
@@ -110,7 +110,7 @@ def triangles_of(follower):
 
 @dataclass
 class Played:
-    """What a node leaves to which the demo was played, and what others saw of it at rest."""
+    """Files of a node that received the demo, and the observations of others at rest."""
 
     folder: Path
     code: int
@@ -118,7 +118,7 @@ class Played:
     answer: SaveMeshResponse
     saved: trimesh.Trimesh
     lost: int
-    # of a follower: its triangles when the mesh was saved, and its vertices when their variances had come
+    # of a follower: its triangles at the saving of the mesh, and its vertices after the arrival of their variances
     followed: bytes
     known: dict
     # and its triangles after `~/reset`
@@ -129,7 +129,9 @@ class Played:
 
 @pytest.fixture(scope="module")
 def played(demo_folder, begun, tmp_path_factory, touchup_bin):
-    """The beginning of the demo is played to a node while a follower loses one of ten changes; at rest the mesh is saved and seen, then comes a reset."""
+    """Plays the beginning of the demo to a node while a follower loses one of ten changes; at rest it saves and observes the mesh, then
+    comes a reset.
+    """
     folder, domain, pick = tmp_path_factory.mktemp("played"), next(domains), random.Random(5)
     with Node(touchup_bin, folder, "--scene", scene_for(demo_folder, folder), domain=domain, ros=CYCLONE) as node:
         save = Client(node, domain, "save_mesh", SaveMeshRequest, SaveMeshResponse)
@@ -168,7 +170,7 @@ def played(demo_folder, begun, tmp_path_factory, touchup_bin):
             touched = [place for place in follower.vertices.values() if place[4] == 1]
             return len(touched) > 1000 and all(math.isfinite(place[3]) for place in touched)
 
-        # at rest all that was touched gets its variance
+        # at rest all touched vertices get their variance
         node.wait_for(is_known)
         known = dict(follower.vertices)
         reader, tiles = Peer(domain).reader("/mesh", Marker, LATCHED), {}
@@ -181,7 +183,7 @@ def played(demo_folder, begun, tmp_path_factory, touchup_bin):
             return len(seen()) == 3 * len(saved.faces)
 
         node.wait_for(are_all_seen, every_s=0.1)
-        # more than once where nobody hears the answer: a session that nobody touched begins again too
+        # more than once if nobody hears the answer: an untouched session begins again too
         assert reset.introduce(0).success
 
         def begins_again():
@@ -195,7 +197,7 @@ def played(demo_folder, begun, tmp_path_factory, touchup_bin):
 
 
 def test_a_played_recording_gives_the_files_of_refine(played, begun, touchup, tmp_path):
-    """Over the network nothing is lost and nothing comes twice: what the node makes of it is compared with one thread on a file."""
+    """Over the network no message is lost or comes twice: the node's result equals that of one thread on a file."""
     report = json.loads((played.folder / "report.json").read_text())
     assert played.code == 0
     assert report["lost"] == report["dropped"] == [0, 0] and report["unrecorded"] == 0
@@ -215,7 +217,7 @@ def test_a_follower_that_loses_messages_has_what_is_saved(played):
     answer, saved = played.answer, played.saved
     assert (answer.vertex_count, answer.face_count) == (len(saved.vertices), len(saved.faces)) == (len(played.known), len(saved.faces))
     assert played.followed == in_order(saved.triangles * 1e-3)
-    # the variance of what was touched is the square of what the file has
+    # the variance of touched vertices is the square of the file's value
     touched = numpy.array([place for place in played.known.values() if place[4] == 1])
     sigmas = saved.metadata["_ply_raw"]["vertex"]["data"]["sigma_mm"].ravel()
     far, at = KDTree(saved.vertices).query(touched[:, :3] * 1e3)
@@ -231,7 +233,7 @@ def test_who_comes_late_sees_what_is_saved(played):
 
 
 def test_a_killed_node_leaves_all_that_was_on_the_disk(demo_folder, tmp_path, touchup, touchup_bin, domain):
-    """In the midst of a stroke, by kill -9. How soon it is on the disk is tested where a test moves the clock."""
+    """In the midst of a stroke, by kill -9. A test that moves the clock checks the delay to the disk."""
     recording = demo_folder / "touch.mcap"
     with Node(touchup_bin, tmp_path, "--scene", scene_for(demo_folder, tmp_path), domain=domain, ros=CYCLONE) as node:
         reader = Peer(domain).reader("/mismatch", HapticMismatch, BEST_EFFORT)
@@ -247,7 +249,7 @@ def test_a_killed_node_leaves_all_that_was_on_the_disk(demo_folder, tmp_path, to
         node.wait()
     taken = stamps(node.session / "recording", "/stylus/wrench")
     assert taken[: len(on_disk)] == on_disk
-    # all that was played up to there
+    # everything played up to there
     assert taken == sorted(stamps(recording, "/stylus/wrench"))[: len(taken)]
     done = touchup("refine", "--resume", node.session, "--json")
     assert done.returncode in (0, 4), done.stderr
@@ -274,7 +276,7 @@ def test_samples_that_are_not_used_are_a_warning_on_diagnostics_and_rosout(demo_
             shown.extend(status for array in states.take(100) for status in array.status if "frame_id" in status.message)
             return said and shown
 
-        # what is logged once is not sent again to who comes later
+        # a late subscriber does not receive a line of the log again
         node.wait_for(lambda: logs.get_matched_publications() and states.take(1))
         node.wait_for(is_said)
         assert (said[0].name, said[0].level) == ("cell_b.touchup", 30)
@@ -295,11 +297,11 @@ def test_a_full_disk_is_reported_and_the_recording_resumes_when_there_is_room(de
         with Node(touchup_bin, disk, "--scene", scene, domain=domain, ros=CYCLONE) as node:
             recording = first_seconds(demo_folder / "touch.mcap", 20, tmp_path / "part.mcap")
             steps = in_step(node, recording, domain)
-            # twice what the disk holds
+            # twice the capacity of the disk
             for _ in itertools.islice(steps, 300):
                 pass
             node.wait_for(lambda: "does not record, make room on the disk" in node.text())
-            # not a byte is left, only names: it tries to begin a file, and cannot
+            # no byte is free, only names: it tries to begin a file, and cannot
             with contextlib.suppress(OSError), (disk / "other").open("wb", buffering=0) as other:
                 while True:
                     other.write(bytes(4096))

@@ -1,6 +1,6 @@
-"""Poses and wrenches of any type that recordings may have, live: the node takes and records the numbers that were sent.
+"""Poses and wrenches of any type that recordings may have, live: the node takes and records the sent numbers.
 
-CycloneDDS publishes; the node finds the types by itself. What is made of a recording does not depend on who wrote it.
+CycloneDDS publishes; the node finds the types by itself. The result of a recording does not depend on its writer.
 """
 
 import subprocess
@@ -133,7 +133,7 @@ def row_of(one):
 
 
 def recorded_by(node):
-    """What the node recorded as PoseStamped and WrenchStamped: of each topic stamps and numbers, and the frame."""
+    """PoseStamped and WrenchStamped in the node's recording: of each topic stamps and numbers, and the frame."""
     found, frames = {POSE: [], WRENCH: []}, {}
     parts = sorted((node.session / "recording").glob("*.mcap"))
     with AnyReader(parts, default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
@@ -144,7 +144,7 @@ def recorded_by(node):
 
 
 def assert_nothing_is_lost(node, count):
-    """Ended, a node has taken all but some of so many messages: what has no partner is no sample."""
+    """At its end a node has taken all but some of `count` messages: one without a partner is no sample."""
     report = node.report()
     assert report["lost"] == report["dropped"] == [0, 0] and report["accepted"] > 0.4 * count, report
 
@@ -166,7 +166,7 @@ def test_a_pose_of_another_type_is_taken_as_the_same_pose(demo_folder, tmp_path,
 
 
 def test_transforms_of_unlike_rates_give_the_pose_of_their_product(demo_folder, tmp_path, touchup_bin, domain):
-    """A link at the rate of the poses, and one at a tenth of it, which moves to and fro by 1 mm and is interpolated by NumPy here."""
+    """A link at the rate of the poses, and one at a tenth of it, which moves to and fro by 1 mm; NumPy interpolates it here."""
     messages = recorded(demo_folder / "touch.mcap", most=FEW)
     poses = [row_of(one) for topic, one in messages if topic == POSE]
     stamps = np.array([stamp for stamp, _ in poses])
@@ -183,7 +183,7 @@ def test_transforms_of_unlike_rates_give_the_pose_of_their_product(demo_folder, 
     for topic, one in messages:
         stamp, row = row_of(one)
         if topic == WRENCH:
-            # in the axes of the frame whose pose is taken, which is the frame of the tool unless it is named
+            # in the axes of the frame of the pose, by default the frame of the tool
             published.append((WRENCH, replace(one, header=Header(one.header.stamp, "tool0"))))
             continue
         back = Rotation.from_quat(row[3:]).apply([0.0, 0.0, shift[at]])
@@ -243,7 +243,7 @@ def test_one_topic_of_a_franka_gives_pose_and_wrench_and_the_mesh_of_its_recordi
         assert_nothing_is_lost(node, len(states))
         assert node.report()["contacts"] > 0
     assert recorded_by(node)[0] == sent
-    # live the axes of its forces are taken from the message, of a recording from its first header
+    # live the axes of its forces come from the message, of a recording from its first header
     out = tmp_path / "resumed.ply"
     done = touchup("refine", "--resume", node.session, "--out", out)
     assert done.returncode in (0, 4), done.stderr
@@ -270,7 +270,7 @@ def test_what_has_no_stamp_counts_when_it_comes(demo_folder, tmp_path, touchup_b
             pass
         assert node.end() in (0, 4), node.text()
         assert_nothing_is_lost(node, FEW)
-    # when a wrench came only the node knows: behind when it was sent, and in that order
+    # only the node knows the arrival of a wrench: after its sending, and in that order
     found, frames = recorded_by(node)
     came = [stamp for stamp, _ in found[WRENCH]]
     assert came == sorted(came) and all(0 <= stamp - at < 10**9 for stamp, (at, _) in zip(came, sent[WRENCH], strict=True))
@@ -292,7 +292,7 @@ def test_a_type_that_cannot_be_read_is_one_clear_error_until_one_comes_that_can(
         names = ["/stylus/wrench", "somebody publishes sensor_msgs/msg/Temperature, not geometry_msgs/msg/WrenchStamped", "FrankaRobotState"]
         node.wait_for(lambda: says("cannot read what is published", *names))
         node.wait_for(lambda: all(any(name in line for line in node.err) for name in names))
-        # who publishes what can be read is heard all the same
+        # the node hears a publisher of readable messages all the same
         right = Peer(domain).writer("/stylus/wrench", Wrench, BEST_EFFORT)
         node.wait_for(right.get_matched_subscriptions)
         said.clear()

@@ -66,7 +66,7 @@ def test_the_node_depends_on_what_it_speaks_and_starts():
     package = parse_package(str(ROOT / "package.xml"))
     spoken = {match for match in re.findall(r"`(\w+)/(?:msg|srv|action)/\w+`", (ROOT / "docs/ros.md").read_text())}
     started = set(re.findall(r'package="(\w+)"', (ROOT / "launch/cell.launch.py").read_text())) - {"touchup"}
-    # a viewer is started where there is one, and no robot needs it
+    # a viewer starts on a machine that has one, and no robot needs it
     started.remove("rviz2")
     wanted = spoken | started | {"builtin_interfaces", "rcl_interfaces", "std_msgs", "launch", "launch_ros", "xacro"}
     assert {depend.name for depend in package.exec_depends} == wanted
@@ -106,7 +106,7 @@ def test_colcon_finds_both_packages_and_their_order(colcon):
 
 
 def test_what_the_launch_files_need_is_installed(tmp_path):
-    """`cargo ament-build`, which colcon calls, with a cargo that makes an empty executable: nothing is compiled."""
+    """`cargo ament-build`, which colcon calls, with a cargo that makes an empty executable without compilation."""
     source, stand_in = tmp_path / "source", tmp_path / "bin"
     (source / "src").mkdir(parents=True)
     stand_in.mkdir()

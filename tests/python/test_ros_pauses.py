@@ -1,4 +1,4 @@
-"""Programs that stand still for a while, as a laptop that sleeps or a debugger has them, and are heard again."""
+"""Programs that stand still for a while, like a laptop that sleeps or a program in a debugger, and then return."""
 
 import contextlib
 import itertools
@@ -14,7 +14,7 @@ from ros_echo import Echo
 from ros_fastdds import FastDds
 from ros_process import Process
 
-# a program that is back is heard after so long; beside other tests no time is measured
+# time until the other side hears a program again; beside other tests this is no measurement
 BACK_S = 5 if os.environ.get("TOUCHUP_FULL") else 60
 # CycloneDDS asks others to wait for 10 s, Fast DDS for 20 s, RustDDS for 50 s
 LONG = [pytest.param(pause_s, marks=pytest.mark.full) for pause_s in (35, 60, 120)]
@@ -58,11 +58,11 @@ def test_who_stood_still_is_heard_again(pause_s):
         until = time.monotonic() + BACK_S
         for pair in pairs:
             pair.goes_on(until - time.monotonic())
-        # nobody is lost again when leases end
+        # no participant drops out again at the end of leases
         time.sleep(pause_s - 13)
         for pair in pairs:
             pair.goes_on(BACK_S)
-            # CycloneDDS is waited for until it has been silent for 40 s
+            # the test waits for CycloneDDS until 40 s of silence
             if pause_s > 50 and pair.name.endswith("sensor"):
                 assert pair.echo.has("WARN", "out of reach") and pair.echo.has("WARN", "a program there is met again")
 

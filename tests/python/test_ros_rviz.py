@@ -1,7 +1,7 @@
-"""Debian's RViz shows the mesh in its colours, and the features with their labels, as a node has published them.
+"""Debian's RViz shows the mesh in its colours, and the features with their labels, as published by a node.
 
-The picture is compared with one that is calculated otherwise: rays through the camera of the view, onto the mesh that the node
-has saved, and onto the places of the recording where the part was touched.
+The test calculates the expected picture in another way: rays through the camera of the view, onto the mesh that the node has saved, and
+onto the touched places of the recording.
 """
 
 import numpy
@@ -33,7 +33,7 @@ def shown(demo_folder, touchup_bin, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def pictures(shown, tmp_path_factory):
-    """The view, and what RViz shows in it: the mesh alone, then the features too."""
+    """The view, and RViz's picture of it: the mesh alone, then the features too."""
     desk_folder = tmp_path_factory.mktemp("desk")
     path = desk_folder / "shown.rviz"
     view = config(path, SIZE, ros_rviz.CLOSE, hidden=("Grid", "TF", "Cell"))

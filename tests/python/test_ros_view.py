@@ -19,7 +19,7 @@ def config():
 
 
 def topics(node):
-    """Every topic in the file: what holds it, and the topic with its quality of service."""
+    """Every topic in the file: its display, and the topic with its quality of service."""
     if isinstance(node, dict):
         for key, value in node.items():
             if key.endswith("Topic") and isinstance(value, dict):
@@ -52,7 +52,7 @@ def test_a_mesh_of_a_million_faces_fits_into_the_queue():
     depth = int(published()["mesh"]["depth"])
     points = int(re.search(r"at most (\d+) points", published()["mesh"]["what"])[1])
     assert depth * points // 3 >= 1_000_000
-    # Fast DDS keeps 5000 samples at most, unless it is configured otherwise
+    # Fast DDS keeps 5000 samples at most by default
     assert depth < 5000
 
 

@@ -1,10 +1,9 @@
 """`touchup step` against arithmetic of 50 digits and more.
 
-The reference does not use the closed forms of the program. The position flow is one scalar equation,
-ds/dt = alpha (F.n - f(h0 - (a.n) s)). Its right-hand side keeps its sign, so the time it takes to come to s is the
-integral of 1/rate, and the wanted s is where that time is dt: it is found by bisection. In u = h/h_min + delta the
-integral is elementary; here it is written with plain exponentials and logarithms, and digits pay for what cancels
-(one test checks it by numerical quadrature). The impulse is J = F.n dt - s/alpha, the turned angle comes from angles.
+The reference does not use the closed forms of the program. The position flow is one scalar equation, ds/dt = alpha (F.n - f(h0 - (a.n) s)).
+Its right-hand side keeps its sign, so the time it takes to come to s is the integral of 1/rate, and bisection finds the s at which that
+time is dt. In u = h/h_min + delta the integral is elementary; here it has plain exponentials and logarithms, and more digits make up for
+cancellation (one test checks it by numerical quadrature). The impulse is J = F.n dt - s/alpha, the turned angle comes from angles.
 
 The program comes from the environment variable TOUCHUP_BIN, or target/release/touchup.
 """
@@ -136,18 +135,18 @@ def turned(q, j):
     angle = start - end
     tangent = [x / norm(tangent) for x in tangent]
     after = plus([mp.cos(angle) * x for x in n], tangent, mp.sin(angle))
-    # d end / d start, and the axis, which is known to EPS / sin(start); d end / d j
+    # d end / d start, and the axis, with an error of EPS / sin(start); d end / d j
     return after, angle, mp.sin(end) / mp.sin(start) + mp.sin(abs(angle)) / mp.sin(start), mp.sin(end) * rate
 
 
 def expected(q):
-    """Displacement and normal of a Lie step with the error that is allowed for each.
+    """Displacement and normal of a Lie step with the permitted error of each.
 
-    The bound is 1e-10 of the displacement and of the angle, or what the rounding of the inputs does where that is
-    more: h = (p - b).n comes from numbers of the size of |p - b| (four roundings) and meets delta in u (two), F.n comes
-    from |F| (six), a.n from 1 (four). Each is moved by that much and the reference is evaluated again. Turning adds three
-    roundings of a unit vector, seen through how the end depends on the start (that grows near n = -F/|F|). The result
-    is rounded to the spacing of the coordinates of b, and s passes through four more products.
+    The bound is 1e-10 of the displacement and of the angle, or the effect of the rounding of the inputs if that is more: h = (p - b).n
+    comes from numbers of the size of |p - b| (four roundings) and meets delta in u (two), F.n comes from |F| (six), a.n from 1 (four). The
+    test moves each by that much and evaluates the reference again. Turning adds three roundings of a unit vector, times the derivative of
+    the end by the start (which grows near n = -F/|F|). Rounding the result takes the spacing of the coordinates of b, and s passes through
+    four more products.
     """
     n, along = vec(q["n"]), along_of(q)
     arm = plus(vec(q["p_m"]), vec(q["b_m"]), -1)
@@ -181,7 +180,7 @@ def direction(rng):
 
 
 def question(rng, tilted, reach=30.0):
-    """h_min, f_max, alpha, beta and dt over 12 decades each; depth and force where something happens."""
+    """h_min, f_max, alpha, beta and dt over 12 decades each; depth and force in the range of an effect."""
     n = direction(rng)
     h_min, f_max = decades(rng, -9, 3), decades(rng, -6, 6)
     delta = rng.choice([0.0, 5.0, rng.uniform(-20, 20)])

@@ -1,4 +1,4 @@
-"""Who may see and do what on the operator's page, and whether what it is sent is the node's mesh; without a browser."""
+"""Permissions of users of the operator page, and the equality of its data with the node's mesh; without a browser."""
 
 import contextlib
 import http.client
@@ -98,7 +98,7 @@ def test_the_page_says_that_nothing_comes_from_elsewhere_and_nobody_frames_it(no
         assert headers["x-content-type-options"] == "nosniff" and headers["referrer-policy"] == "no-referrer"
     status, headers, text = ask(node.url, "/")
     assert (status, headers["content-type"]) == (200, "text/html; charset=utf-8")
-    # what it loads is here too
+    # the files that it loads are here too
     for asset in re.findall(rb'(?:src|href)="([^"]+)"', text):
         assert asset.startswith(b"/"), asset
         assert ask(node.url, asset.decode())[0] == 200, asset
@@ -111,7 +111,7 @@ def test_a_request_of_another_page_is_refused(node):
             pass
         assert refused.value.response.status_code == 403
     assert ask(node.url, "/api/state", Origin=node.url)[0] == 200
-    # who opens the socket without saying where it is from, and who changes something, is no browser's page of ours
+    # a client that opens the socket without an origin, and one that changes something, is no browser's page of ours
     upgrade = {"Connection": "Upgrade", "Upgrade": "websocket", "Sec_WebSocket_Version": "13"}
     assert ask(node.url, "/ws", Sec_WebSocket_Key="x" * 22 + "==", **upgrade)[0] == 403
     assert ask(node.url, "/api/state", method="POST")[0] == 403
@@ -259,12 +259,12 @@ def test_pages_have_the_nodes_mesh_however_late_they_join_and_one_that_takes_not
         ]
         slow.sendall("\r\n".join([*lines, "", ""]).encode())
         before = early.version
-        # a page that takes nothing for long is left behind
+        # the node leaves behind a page that reads nothing for long
         for _ in in_step(node, first_seconds(demo_folder / "touch.mcap", 12, tmp_path / "begun.mcap"), node.domain):
             with contextlib.suppress(TimeoutError):
                 while True:
                     early.take(0)
-        # at rest, some time after the last sample, it is what is saved
+        # at rest, some time after the last sample, it equals the saved mesh
         early.take_until(lambda: early.call("~/save_mesh", overwrite=True, name="saved.ply")["response"]["mesh_version"])
         saved = early.call("~/save_mesh", overwrite=True, name="saved.ply")["response"]
         early.take_until(lambda: early.version >= saved["mesh_version"])
@@ -276,11 +276,11 @@ def test_pages_have_the_nodes_mesh_however_late_they_join_and_one_that_takes_not
         mesh = trimesh.load(node.session / "saved.ply", process=False)
         assert len(early.faces) == len(mesh.faces) == saved["face_count"]
         corners = numpy.array([[early.vertices[vertex] for vertex in face] for face in early.faces.values()])
-        # the same triangles, however they are numbered: each has its own middle, and that is one of the others
+        # the same triangles in any numbering: each has its own middle, and that is one of the others
         ours, theirs = (numpy.asarray(triangles).mean(axis=1) for triangles in (corners * 1e3, mesh.triangles))
         distances, nearest = cKDTree(theirs).query(ours)
         assert distances.max() < 1e-3 and len(set(nearest)) == len(theirs)
-        # how well each vertex is known is what is saved beside it
+        # the uncertainty of each vertex equals the saved one beside it
         touched = [vertex for vertex in early.vertices if early.support[vertex] == 1]
         early.take_until(lambda: OUTLIER in early.numbers_of and all(early.variance[vertex] >= 0 for vertex in touched))
         columns = mesh.metadata["_ply_raw"]["vertex"]["data"]
@@ -310,7 +310,7 @@ def test_a_recording_on_the_page_ends_with_the_result_of_what_was_touched_until_
     told = ["--tip-radius-mm", 1.5, "--stiffness-n-per-mm", 20, "--json"]
     with Process(touchup_bin, "refine", "--live", "--web", "127.0.0.1:0", *files, *told, domain=next(domains)) as refining:
         with Socket(page_url(refining)) as page:
-            # nothing is touched before somebody sees it
+            # no touch before an onlooker has connected
             page.take_until(lambda: page.newest.get("tip", {}).get("markers") and page.version > 1000)
             assert page.call("~/undo", strokes=1)["response"]["strokes"] == 1
             page.take_until(lambda: page.call("~/pause", data=True)["response"]["success"])
@@ -318,7 +318,7 @@ def test_a_recording_on_the_page_ends_with_the_result_of_what_was_touched_until_
     summary = json.loads(refining.out[-1])
     assert summary["told"]["stiffness_n_per_mm"] == {"value": 20.0, "source": "scene"}
     assert summary["accepted"] > 100 and summary["patch"]["added_faces"] > 0
-    # of the session that is left, without the stroke that was undone
+    # of the session before, without the undone stroke
     (session,) = (tmp_path / "sessions").iterdir()
     assert [json.loads(line)["change"] for line in (session / "strokes.jsonl").read_text().splitlines()] == ["undo"]
     assert (tmp_path / "refined.ply").is_file()

@@ -1,4 +1,4 @@
-"""An arm moves for the page only while its button is held: the beats of a socket, and the button in a browser. The arm is simulated."""
+"""An arm moves for the page only during a hold of its button: the beats of a socket, and the button in a browser. The arm is simulated."""
 
 import json
 import re
@@ -71,10 +71,11 @@ def arm_of(node, condition):
 
 
 def order(node, hole, beats_s=0.0, moves=None):
-    """Orders a probing by held beats, and lets go after some time (from when the arm moves on, where that is an event), or when it is done;
-    when that was, and the result of the order.
+    """Orders a probing by held beats, and lets go after some time (from the arm's motion on, if that is an event), or at its end; returns
+    the time of that, and the result of the order.
 
-    By a page of its own, which reads all that comes and looks at its answer alone, so that no beat is late."""
+    By a page of its own, which reads all arrivals and looks at its answer alone, so that no beat is late.
+    """
     with Socket(node.url) as page:
         beats = Beats(page)
         time.sleep(0.1)
@@ -167,9 +168,10 @@ def test_an_arm_that_was_stopped_among_its_touches_goes_out_by_the_way_that_it_c
 
 
 def stood_at(places):
-    """When a tip stood that went straight before, by its places with their stamps and when each was seen: after the last of them at which it
-    moved it went on as fast as before, and then braked. A simulated arm on a busy machine is behind real time by no more than the
-    least time from a stamp until it was seen."""
+    """Time at which a tip on a straight path stood, by its places with their stamps and times of sight: after the last of them with motion
+    it went on at the same speed, and then braked. A simulated arm on a busy machine is behind real time by no more than the least time from
+    a stamp to its sight.
+    """
     places = [places[0], *(now for now, before in zip(places[1:], places) if now[0] > before[0])]
     steps = [(now[0] - before[0], numpy.linalg.norm(now[1] - before[1])) for now, before in zip(places[1:], places)]
     last = max(number for number, (_, way) in enumerate(steps) if way > NOISE_M)

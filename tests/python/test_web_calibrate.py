@@ -1,4 +1,4 @@
-"""Calibrations from recordings in the setup on the page: over HTTP and by clicks what is in the recordings comes into scene.yaml."""
+"""Calibrations from recordings in the setup on the page: over HTTP and by clicks the contents of the recordings come into scene.yaml."""
 
 import datetime
 import os
@@ -46,7 +46,7 @@ def scans(made, tmp_path):
     return shutil.copytree(made, tmp_path / "scans")
 
 
-# the payload last: while the points were touched the sensor carried nothing
+# the payload last: during the touches of the points the sensor carried nothing
 SOURCES = {
     "tip": {"recording": "swing"},
     "scan": {"recording": "dwells.mcap", "points": "points.csv"},
@@ -58,7 +58,7 @@ def test_what_is_in_the_recordings_is_found_and_comes_into_the_scene_when_it_is_
     with SetupNode(touchup_bin, tmp_path) as node:
         assert {one["name"] for one in node.state()["recordings"]} == {"swing", "still.mcap", "dwells.mcap"}
         assert [one["name"] for one in node.state()["tables"]] == ["points.csv"]
-        # a tip of the scene has to be confirmed, and what rests on a point is its ball
+        # the user has to confirm a tip of the scene, since its ball rests on a point
         assert node.ask("/api/setup/calibrate", {"what": "scan", **SOURCES["scan"]})[0] == 409
         assert node.ask("/api/setup/tip", {"radius_mm": 1.5})[0] == 200
         for what, source in SOURCES.items():
@@ -66,7 +66,7 @@ def test_what_is_in_the_recordings_is_found_and_comes_into_the_scene_when_it_is_
             assert node.ask("/api/setup/use", {"what": what})[0] == 409
             found = node.calibrated(what=what, **source)
             assert (found["state"], found["is_used"], found["doubts"]) == ("found", False, [])
-            # nothing is taken unasked
+            # nothing changes without a request
             assert (scans / "scene.yaml").read_text() == before
             status, state = node.ask("/api/setup/use", {"what": what})
             assert status == 200 and state["calibration"]["is_used"], state
@@ -81,7 +81,7 @@ def test_what_is_in_the_recordings_is_found_and_comes_into_the_scene_when_it_is_
 
 
 def check_truth(what, scene, found):
-    """The scene has what is in the recording, within five of its own standard uncertainties."""
+    """The scene has the values of the recording, within five of its own standard uncertainties."""
     if what == "tip":
         off = numpy.array(scene["tip"]["offset_mm"]) - OFFSET_MM
         assert (abs(off) < 5 * numpy.array(found["offset_mm"]["std"])).all(), off
@@ -107,7 +107,7 @@ def test_what_the_command_line_puts_into_the_scene_meanwhile_stays_there(touchup
         assert status == 200 and state["calibrations"]["payload"]["is_there"], state
         text = scene.read_text()
         assert "# touchup calibrate payload: 12 static segments" in text and "# touchup calibrate tip: 3000 poses" in text
-        # what is no scene any more is neither used nor written over
+        # the setup neither uses nor overwrites a file that is no scene any more
         scene.write_text("tip: [\n")
         status, found = node.ask("/api/setup/calibrate", {"what": "payload", "recording": "still.mcap"})
         assert status == 422 and "scene.yaml" in found["error"], found
@@ -171,7 +171,7 @@ def test_a_recording_that_is_sent_is_kept_and_can_be_used(touchup_bin, scans, tm
             assert status == 400 and found["error"], name
         assert node.state()["scan"] == {"state": "none"}
         assert node.calibrated(what="payload", recording="mine-2.mcap")["state"] == "found"
-        # another tip may be on another stylus: what was found and not used is gone
+        # another tip may be on another stylus: unused results are gone
         assert node.ask("/api/setup/tip", {"radius_mm": 2})[1]["calibration"] == {"state": "none"}
 
 

@@ -1,5 +1,6 @@
-"""The replay of a session on the operator's page: against what a page had of the session itself and what was saved of it, its controls, who
-may have it and how many, and its page in a browser."""
+"""The replay of a session on the operator page: against a page's view of the session itself and its saved files, its controls, the number
+of its viewers and their permissions, and its page in a browser.
+"""
 
 import contextlib
 import json
@@ -61,8 +62,9 @@ class ReplaySocket(Socket):
 
 
 def triangles(page):
-    """Those that a page has, however they are numbered and turned: of the three orders of each the least, bit by bit. They are made
-    once for each change of its mesh: made for each message, they would fall behind the messages."""
+    """The triangles of a page in an order independent of numbering and rotation: of the three orders of each the least, bit by bit. A
+    change of the mesh makes them once: made for each message, they would fall behind the messages.
+    """
     state = page.session, page.version
     if page.known_triangles is None or page.known_triangles[0] != state:
         corners = numpy.array([[page.vertices[vertex] for vertex in face] for face in page.faces.values()], dtype=numpy.float32)
@@ -102,7 +104,7 @@ def touch_that(page, begins_right):
 
 
 def take_until(pages, condition):
-    """Takes messages of several pages up until it holds: a page that takes nothing for long is left behind by the node."""
+    """Takes messages of several pages up until the condition holds: the node leaves behind a page that reads nothing for long."""
     until = time.monotonic() + DEADLINE_S
     while not condition():
         assert time.monotonic() < until, [page.newest for page in pages]
@@ -119,7 +121,7 @@ def played(touchup_bin, recording, domain, page):
 
 
 def halved(recording, folder):
-    """24 s of a recording in two halves: a touch that begins between two changes of strokes would take away what can be redone."""
+    """24 s of a recording in two halves: a touch that begins between two changes of strokes would discard the redoable ones."""
     times = []
     copy_part(recording, folder / "none.mcap", lambda _, stamp_ns: times.append(stamp_ns))
     begin = min(times) + BEGIN_NS
@@ -131,8 +133,9 @@ def halved(recording, folder):
 
 @pytest.fixture(scope="module")
 def recorded(touchup_bin, demo_folder, tmp_path_factory):
-    """A session that is over: strokes were undone and redone while it was touched, and one taken out; in the end another one was taken out, and
-    one undone. Its folder, and the triangles that a page had of it at rest."""
+    """An ended session: with undo and redo of strokes during the touches, and one removal; in the end with another removal, and one undo.
+    Returns its folder, and the triangles of a page at rest.
+    """
     folder = tmp_path_factory.mktemp("recorded")
     halves = halved(demo_folder / "touch.mcap", folder)
     with PageNode(touchup_bin, folder, demo_folder / "scan.ply") as node, Socket(node.url) as page:
@@ -154,7 +157,7 @@ def recorded(touchup_bin, demo_folder, tmp_path_factory):
             out = page.call("~/take_out_touch", touch=touch_that(page, begins_right))["response"]
             assert out["success"], out
 
-        # long before the strokes that were undone
+        # long before the undone strokes
         take_out(lambda begun_ns: begun_ns < changed_ns - 5 * 10**9)
         played(touchup_bin, halves[1], node.domain, page)
         at_rest()
@@ -228,7 +231,7 @@ def test_a_touch_that_was_taken_out_is_there_until_then(node, recorded):
     lines = (kept / "strokes.jsonl").read_text().splitlines(keepends=True)
     (kept / "strokes.jsonl").write_text("".join(line for line in lines if "take_out" not in line))
 
-    # the first one was taken out between the halves
+    # the first removal came between the halves
     before_s = HALF_NS / 1e9 - 2
     with ReplaySocket(node, "one") as one, ReplaySocket(node, "kept") as kept:
         for page in (one, kept):

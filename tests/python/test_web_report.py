@@ -24,8 +24,9 @@ DRAWING = ROOT / "examples/plate_nominal.csv"
 
 @pytest.fixture(scope="module")
 def touched(touchup_bin, demo_folder, tmp_path_factory):
-    """A node with a nominal part after the beginning of the demo, whose page lets in by link; its cookies by role; and, beside the
-    session that runs, `over`: one that is over, with what refine makes of the demo."""
+    """A node with a nominal part after the beginning of the demo, whose page lets in by link; its cookies by role; and, beside the running
+    session, `over`: an ended one, with refine's result of the demo.
+    """
     folder = tmp_path_factory.mktemp("reported")
     part, begun = demo_folder / "truth.ply", first_seconds(demo_folder / "touch.mcap", 4, folder / "begun.mcap")
     with PageNode(touchup_bin, folder, demo_folder / "scan.ply", "--web-links", "--web-nominal", part, ros=CYCLONE) as node:
@@ -94,7 +95,7 @@ def test_a_drawing_that_lies_elsewhere_is_fit_to_the_part(touched):
         writer = csv.DictWriter(file, turned[0])
         writer.writeheader()
         writer.writerows(turned)
-    # of the session that was refined whole: one that is played on a busy machine may lack what fixes all freedoms
+    # of the session with all of its recording: one played on a busy machine may lack touches that fix all freedoms
     query = {"nominal": "upload", "file": "elsewhere.csv", "align": "best-fit"}
     status, said = post(touched, "over", query, elsewhere.read_bytes())
     assert status == 200, said
@@ -103,7 +104,7 @@ def test_a_drawing_that_lies_elsewhere_is_fit_to_the_part(touched):
 
 
 def turned_about_z(name, value):
-    """A field of a drawing that is turned by half a turn about z."""
+    """A field of a drawing turned by half a turn about z."""
     is_turned = name in ("center_x_mm", "center_y_mm", "axis_x", "axis_y", "datum_x_mm", "datum_y_mm")
     return f"{-float(value)}" if is_turned and value else value
 
@@ -192,7 +193,7 @@ def test_what_is_too_large_is_refused_before_it_comes_and_while_it_comes(touched
         status, said = post(touched, touched.session.name, {"nominal": "upload", "file": "a.csv"}, body)
         assert status == 413, said
     except (BrokenPipeError, ConnectionResetError):
-        # it was closed before all was sent
+        # it closed before the end of the answer
         pass
     assert not [left for left in touched.session.iterdir() if left.name.startswith(".upload")]
 
@@ -254,7 +255,7 @@ def test_an_operator_makes_a_report_by_clicks_and_sees_the_decisions(browser, to
     with page.expect_download() as saving:
         result.get_by_role("link", name="CSV").click()
     assert saving.value.suggested_filename == "results.csv"
-    # what the node refuses is shown in its words
+    # the page shows the node's words of a refusal
     dialog.get_by_label("Probability").fill("20")
     dialog.get_by_role("button", name="Make the report").click()
     dialog.get_by_role("alert").wait_for()

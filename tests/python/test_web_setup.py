@@ -1,5 +1,6 @@
-"""The setup on the page before there is a node: over HTTP, what is refused and what the node then begins with; and by clicks, in a real
-browser, from nothing to the live page."""
+"""The setup on the page before there is a node: over HTTP, refusals and the settings at the node's begin; and by clicks, in a real browser,
+from nothing to the live page.
+"""
 
 import http.client
 import json
@@ -39,7 +40,7 @@ def test_a_node_without_a_scan_is_set_up_over_http_and_begins_with_what_was_said
         (likely,) = [one for one in found["scan"]["units"] if one["is_likely"]]
         assert likely["unit"] == "mm"
         assert numpy.allclose(likely["sides_m"], (mesh.bounds[1] - mesh.bounds[0]) * 1e-3)
-        # nothing of it is taken unasked
+        # nothing changes without a request
         assert found["unit"] is None and found["tip"] is None
         assert node.ask("/api/setup/start", {})[0] == 409
         assert node.ask("/api/setup/unit", {"unit": "mm"})[0] == 200
@@ -121,7 +122,7 @@ def test_an_upload_is_never_too_large_and_never_writes_over_a_file(empty, demo_f
     assert empty.ask("/api/setup/upload?name=scan.ply", scan)[0] == 200
     assert empty.read()["scan"]["file"] == "scan-2.ply"
     assert (empty.scans / "scan.ply").read_bytes() == b"mine"
-    # what is said to be too large is refused before any of it comes
+    # the node refuses a stated size above the limit before any of the file comes
     place = urlsplit(empty.url)
     connection = http.client.HTTPConnection(place.hostname, place.port, timeout=60)
     connection.putrequest("POST", "/api/setup/upload?name=big.ply")
@@ -191,7 +192,7 @@ def test_an_error_of_the_start_is_told_at_its_step_and_can_be_mended(empty, demo
     empty.choose("scan.ply")
     empty.ask("/api/setup/unit", {"unit": "mm"})
     empty.ask("/api/setup/tip", {"radius_mm": 1.5})
-    # it goes after it was read
+    # the file goes after its reading
     (empty.scans / "scan.ply").unlink()
     assert empty.ask("/api/setup/start", {})[0] == 200
     empty.wait_for(lambda: empty.state()["stage"] == "choosing")
@@ -216,7 +217,7 @@ def test_what_is_wrong_around_a_node_is_told_on_the_page_and_a_signal_ends_it(to
             node.wait_for(lambda: node.state()["stage"] == "choosing")
             failure = node.state()["failure"]
             assert failure["step"] == "start" and "`robot:` in the scene" in failure["why"], failure
-        # nothing is there that would have to be saved
+        # nothing there needs saving
         assert node.end() == 130, node.text()
 
 
@@ -304,7 +305,7 @@ def test_by_clicks_from_nothing_to_the_live_page(browser, touchup_bin, demo_fold
             wait_until(each, "window.touchup !== undefined && touchup.faceCount() > 0")
             assert each.wrong == []
         page.evaluate("touchup.idle()")
-        # how large it is has just been said
+        # the dialogue has just given its size
         asked = page.locator(".setup .question").inner_text()
         assert asked == {"en": "Switch the stylus on. Do place and force come in?", "de": "Schalten Sie den Taster ein. Kommen Lage und Kraft an?"}[language]
         page.screenshot(path=tmp_path / "live.png")
@@ -325,7 +326,7 @@ def test_the_keyboard_alone_leads_through_the_steps(browser, touchup_bin, demo_f
 
         page.get_by_role("button", name=re.compile("scan.ply")).focus()
         page.keyboard.press("Enter")
-        # each step that is reached has the focus, and its first control is the next stop
+        # each reached step has the focus, and its first control is the next stop
         wait_until(page, is_at("unit"))
         page.keyboard.press("Tab")
         page.keyboard.press("Enter")

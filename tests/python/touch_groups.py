@@ -1,6 +1,6 @@
 """Touches that share their error: together they weigh as one in the program's fits, and so in those that check them."""
 
-# touches of one stroke within so long share their error
+# touches of one stroke within this time share their error
 SHARED_NS = 100_000_000
 
 

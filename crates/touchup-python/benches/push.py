@@ -1,11 +1,11 @@
-"""What a push costs from Python over what the engine itself takes, on a wavy plate that a ball slides over in contact.
+"""Cost of a push from Python over that of the engine itself, on a wavy plate with a ball that slides in contact.
 
     python crates/touchup-python/benches/push.py [SAMPLES]
 
-Of the installed wheel. What is compared with is a loop of Rust over the same arrays in the same process, `_push_in_rust`, which makes a
-sample of each row and pushes it into the same refinement, which judges it too. Times are of the processor. For single pushes they are the least of several rounds taken in turn, as anything
-else that runs only adds to them; for `push_many`, whose part is small, the ratio of each of many pairs is taken, and the median of these with its
-standard error.
+Of the installed wheel. The reference is a loop of Rust over the same arrays in the same process, `_push_in_rust`, which makes a sample of
+each row and pushes it into the same refinement, including its checks. Times are of the processor. For single pushes they are the least of
+several rounds in turn, since other load only adds to them; for `push_many`, with its small share, the median of the ratios of many pairs
+with its standard error.
 """
 
 import sys

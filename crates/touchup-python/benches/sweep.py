@@ -1,9 +1,9 @@
-"""How much faster a sweep is by Ray with two workers than by one process.
+"""Speed-up of a sweep by Ray with two workers over one process.
 
     python benches/sweep.py [JOBS] [SECONDS]      jobs, 200; seconds of touches in each, 20
 
-Both run the same jobs on a quiet machine; each worker of Ray has a CPU. The start of the cluster, which one that runs already does not
-need, is printed by itself. The results must be the same bytes.
+Both run the same jobs on a quiet machine; each worker of Ray has a CPU. A line of its own gives the start of the cluster, which a running
+one saves. The results must be the same bytes.
 """
 
 import subprocess

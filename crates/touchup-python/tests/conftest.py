@@ -1,9 +1,9 @@
-"""Tests of the installed wheel: they run from outside of the source tree, so that no file beside it is imported.
+"""Tests of the installed wheel: they run outside of the source tree, so that they import no file beside it.
 
     cd /tmp && python -m pytest …/crates/touchup-python/tests
 
-What is marked `full` is a slow proof, for the shards of tests/shards.sh (TOUCHUP_FULL), and is not selected without; files that
-need their packages are not read then.
+The mark `full` names a slow proof, for the shards of tests/shards.sh (TOUCHUP_FULL); without the variable pytest does not select it, and
+does not read files that need its packages.
 """
 
 import json
@@ -88,7 +88,7 @@ def plate(z=0.0, side=0.02, count=21):
 
 
 def slide(height, count=4000, force=2.0, stiffness=2e4, side=0.02):
-    """A ball of 1.5 mm that is pressed on a plane at `height`, m, and slides there and back; the tip bends by force / stiffness."""
+    """A ball of 1.5 mm that presses on a plane at `height`, m, and slides there and back; the tip bends by force / stiffness."""
     turn = np.linspace(0, 40 * np.pi, count)
     share = np.linspace(0.25, 0.75, count)
     position = np.stack([side * (0.5 + 0.25 * np.sin(turn)), side * share, np.full(count, height)], axis=1)

@@ -7,7 +7,7 @@ import socket
 import subprocess
 import time
 
-# nothing is waited for longer; nothing is expected to take as long
+# limit of any wait; nothing should take as long
 DEADLINE_S = 120
 
 CONFIGURATION = """\
@@ -45,7 +45,7 @@ def free_port():
 
 
 class Slurm:
-    """A cluster of one machine; only processes that it started are ended, by their ids."""
+    """A cluster of one machine; it ends only its own processes, by their ids."""
 
     def __init__(self, folder, cpus=2):
         self.folder, self.cpus, self.processes = folder, cpus, []

@@ -1,4 +1,4 @@
-"""A sweep of small jobs: seconds of touches on the ring, and what its engines made."""
+"""A sweep of small jobs: seconds of touches on the ring, and the results of its engines."""
 
 import json
 

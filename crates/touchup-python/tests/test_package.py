@@ -1,4 +1,4 @@
-"""What comes with the wheel: simulation, command, types, examples, documentation."""
+"""Contents of the wheel: simulation, command, types, examples, documentation."""
 
 import os
 import subprocess
@@ -25,7 +25,7 @@ def test_a_simulation_in_a_world_comes_with_its_scene_and_back_from_its_file(rin
     recorded = touchup.Recording.read(tmp_path / "touch.mcap")
     assert recorded.wrench_frame == made.recording.wrench_frame == "sensor"
     for name in ("pose_stamp_ns", "position", "orientation_xyzw", "wrench_stamp_ns", "force", "torque"):
-        # a file is read in the order of its stamps, in which some arrive late
+        # the reader follows the order of a file's stamps, and some arrive late
         assert np.array_equal(np.sort(getattr(made.recording, name), 0), np.sort(getattr(recorded, name), 0)), name
     # of an edge of 1.5 mm: the median of the scan's edges
     corners = made.scan.vertices[made.scan.faces]
@@ -64,7 +64,7 @@ def test_types_are_right_in_the_eyes_of_mypy(tmp_path):
         "update: touchup.Update = touchup.Refiner(refined.mesh, scene).push(0, (0, 0, 0), (0, 0, 0, 1), [0, 0, 1])\n",
         encoding="utf-8",
     )
-    # Ray is there where its own tests run: test_ray.py
+    # Ray comes with its own tests: test_ray.py
     config = tmp_path / "without_ray.ini"
     config.write_text("[mypy-ray.*]\nignore_missing_imports = True\n", encoding="utf-8")
     for target in ([str(use)], ["-p", "touchup", "--config-file", str(config)]):

@@ -92,7 +92,7 @@ def test_ten_killed_workers_change_nothing(jobs, serial, cluster):
         killer.join()
     assert len(killed) == KILLS
     assert table(jobs, jobs.parent / "killed") == table(jobs, serial)
-    # nor is anything left of those that were killed
+    # nor does anything of the killed ones remain
     assert files_of(jobs.parent / "killed") == files_of(serial)
 
 
@@ -107,7 +107,7 @@ def test_the_command_says_how_far_it_is(jobs, serial):
 
 
 def descendants():
-    """Of this process, by what /proc says of each one's parent."""
+    """Descendants of this process, by the parents in /proc."""
     parents = {}
     for path in Path("/proc").glob("[0-9]*/stat"):
         try:

@@ -46,7 +46,7 @@ def test_a_table_is_read_by_the_columns_that_the_scene_names(tmp_path):
 
 
 def test_what_is_doubtful_is_warned_of():
-    """A plane that is touched in strokes by a leaning hand whose forces turn with the stylus, with orientations of the other direction."""
+    """A plane touched in strokes by a leaning hand whose forces turn with the stylus, with orientations of the other direction."""
     samples = slide(0.2e-3, count=8000)
     lean = np.stack([40 + 20 * np.sin(np.arange(8000) / 700), 30 * np.cos(np.arange(8000) / 900)], axis=1) * np.pi / 360
     sine, cosine = np.sin(lean), np.cos(lean)
@@ -66,7 +66,7 @@ def test_what_is_doubtful_is_warned_of():
 
 
 def lifted(of_strokes):
-    """A plane that is touched in strokes, each so manieth of them on a part that was pushed up by 0.1 mm in between."""
+    """A plane touched in strokes; one in `of_strokes` of them meets a part pushed up by 0.1 mm in between."""
     samples = slide(0.2e-3, count=8000)
     is_lifted = np.arange(8000) // 400 % of_strokes == 1
     return touchup.Samples(samples.stamp_ns, samples.position + 0.1e-3 * is_lifted[:, None] * [0, 0, 1], samples.force)
@@ -147,7 +147,7 @@ def test_other_threads_run_while_a_scan_is_refined(touched):
 
     beside = threading.Thread(target=tick)
     interval = sys.getswitchinterval()
-    sys.setswitchinterval(1e3)  # nobody is interrupted: a tick comes only where the interpreter is let go of
+    sys.setswitchinterval(1e3)  # no interruption: a tick comes only when the push releases the interpreter
     try:
         beside.start()
         time.sleep(0.01)

@@ -40,10 +40,10 @@ def test_a_plane_is_felt_where_the_ball_bends_towards_it():
     height, force, stiffness = 0.15e-3, 2.0, 2e4
     refiner, updates = pushed_one_by_one(slide(height, count=16000, force=force, stiffness=stiffness))
     first = next(update for update in updates if update.case != "free")
-    # the ball as its pose has it is lower than the real one, by what the tip bends
+    # the ball of the pose is lower than the real one, by the bend of the tip
     assert first.distance == pytest.approx(height - force / stiffness, abs=1e-9)
     x, y, z = refiner.mesh.vertices.T
-    # well inside of what the ball went over; at its rim faces tilt
+    # well inside of the swept region; at its rim faces tilt
     inside = (np.abs(x - 0.01) < 0.004) & (np.abs(y - 0.01) < 0.004)
     assert inside.sum() > 40 and np.median(z[inside]) == pytest.approx(height, abs=2e-6)
 

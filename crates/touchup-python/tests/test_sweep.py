@@ -31,7 +31,7 @@ def test_a_job_is_run_once_and_refuses_what_was_not_planned(planned, touched_fil
     assert {path.name for path in Path(made.result).iterdir()} == {"SHA256SUMS", "job.json", "summary.json", "refined.ply", "features.json"}
     assert touchup.sweep.run_job(jobs, 0).was_there
     given = {name: (touched_files / file).read_bytes() for name, file in (("scan", "scan.ply"), ("recording", "touch.mcap"))}
-    # not even the folder of its results is another one: what is given is looked at all the same
+    # `run_job` checks the given contents for any folder of results
     with pytest.raises(touchup.TouchupError, match="not what was planned"):
         touchup.sweep.run_job(jobs, 1, planned / "others", scan=given["scan"] + b" ", recording=given["recording"])
     assert not touchup.sweep.run_job(jobs, 1, **given).was_there
@@ -49,7 +49,7 @@ def test_tables_and_what_if_are_of_the_results(planned):
     found = touchup.what_if(results[0].result, results[1].result)
     assert found.keys == {"tip.stiffness_n_per_mm": [20, 10]}
     assert found.b.moved.sum() > 0 and found.b.displacement.shape == (len(found.b.mesh.vertices),)
-    # a softer stylus bends farther: what it touched lies higher
+    # a softer stylus bends farther: its touches lie higher
     assert np.median(found.b.displacement[found.b.moved]) > 0
     with pytest.raises(touchup.TouchupError):
         touchup.what_if(results[0].result, planned)

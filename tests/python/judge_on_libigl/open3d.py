@@ -1,7 +1,7 @@
-"""The queries that the judge asks of open3d, answered by libigl: a wheel of 10 MB in place of 450.
+"""The open3d queries of the judge on libigl: a wheel of 10 MB in place of 450.
 
-The quick checks put this folder before the judge's libraries; with TOUCHUP_FULL the judge has open3d itself, and
-test_judge.py compares the two. Coordinates are rounded to single precision as open3d does, distances are not.
+The quick checks put this folder before the judge's libraries; with TOUCHUP_FULL the judge has open3d itself, and test_judge.py compares the
+two. Coordinates have single precision as in open3d, distances have double.
 """
 
 from types import SimpleNamespace

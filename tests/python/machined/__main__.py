@@ -1,8 +1,8 @@
 """python -m machined TOUCHUP OUT [--seeds A-B] [--worlds W,...] [--scanner cheap|good]: parts scanned, touched, refined and judged.
 
-Each part has its own folder: the true part, its scan and recording by `touchup simulate`, refined mesh, features and touches. A folder whose
-recording is there is refined again, not simulated again. Prints what was missed or invented, and a table; --json writes the same for
-`machined.plots` and `machined.failures`.
+Each part has its own folder: the true part, its scan and recording by `touchup simulate`, refined mesh, features and touches. A folder with
+a recording goes through refinement again, not through simulation. Prints missed and invented features, and a table; --json writes the same
+for `machined.plots` and `machined.failures`.
 """
 
 import argparse

@@ -1,7 +1,7 @@
-"""python -m machined.failures OUT.png PARTS VERDICTS.json...: what was missed (red) and what was invented (violet), each with what is around it.
+"""python -m machined.failures OUT.png PARTS VERDICTS.json...: missed (red) and invented (violet) features, each with its surroundings.
 
-PARTS is the folder of `python -m machined`, the files are its --json. Each picture shows the true part on the left and the refined mesh on the right,
-cut out around the place and seen along the axis, a little aslant; faces seen from behind are red.
+PARTS is the folder of `python -m machined`, the files are its --json. Each picture shows the true part on the left and the refined mesh on
+the right, cut out around the place and seen along the axis, a little aslant; red faces show their backs.
 """
 
 import argparse
@@ -22,7 +22,7 @@ MISSED, INVENTED = (200, 30, 30), (120, 0, 160)
 
 
 def in_frame_of_part(mesh, folder, world):
-    """The refined mesh where the part is."""
+    """The refined mesh in the frame of the part."""
     if world == "plain":
         return mesh
     origin_and_axes = np.vstack([np.zeros(3), np.eye(3)])
@@ -52,7 +52,7 @@ def picture(parts, verdict, place, colour):
     turn = view_along(place["axis"])
     panels = []
     meshes = [trimesh.load(folder / "part.stl"), in_frame_of_part(trimesh.load(folder / "refined.ply", process=False), folder, verdict["world"])]
-    # large faces of the true part reach far beyond what is cut out
+    # large faces of the true part reach far beyond the cut
     meshes[0] = meshes[0].subdivide_to_size(4.0)
     for mesh in meshes:
         piece = cut_out(mesh, centre)

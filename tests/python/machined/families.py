@@ -1,6 +1,6 @@
 """Families of random machined parts: blocks, plates, castings, shafts, brackets, sheets.
 
-Each draws its sizes, places features where they do not cross unless they are meant to, and notes what is true of them.
+Each draws its sizes, places features without crossings unless it intends one, and notes the true features.
 """
 
 import numpy as np
@@ -15,7 +15,7 @@ WALL = 2.5
 
 
 class Face:
-    """A flat face on which features are placed without crossing each other."""
+    """A flat face for features that do not cross each other."""
 
     def __init__(self, origin, axis, direction, size, depth):
         self.frame = frame(origin, axis, direction)
@@ -96,7 +96,7 @@ def drilled(part, rng, face, kind, group):
         is_last = number == len(steps) - 1
         one = hole_feature(face.at(*spot, -before), axis, size, down - before, is_through if is_last else False, group=group)
         if not is_last:
-            # a step's floor is a ring: the group says what it is
+            # a step's floor is a ring: the group marks it as a step
             one.sizes["through"] = None
         part.cut(rod(size / 2, end if is_last else -down, OUT), place, one)
         part.note(one)
@@ -251,7 +251,7 @@ def block(rng):
     features_on(part, rng, top, rng.integers(3, 7), DRILLED + MILLED + ["boss", "rib", "notch"])
     for side in sides_of(length, width, height):
         if rng.random() < 0.5:
-            # from the side only shallow holes, so that nothing is crossed
+            # from the side only shallow holes, so that none crosses another
             side.depth = 8.0
             features_on(part, rng, side, 1, ["blind"])
     return part

@@ -1,8 +1,8 @@
 """Judges found features against the true ones of a part.
 
-A found feature is of a true one when its axis is within 20°, its middle no farther from the true axis than 0.25 sizes (or 0.8 mm), its place
-along the axis within the true extent (2 mm room), and its size within a factor of 1.6. Kinds do not matter for that: whether the kind
-is right is counted apart. Errors are those of numbers with a stated standard deviation.
+A found feature matches a true one if its axis is within 20°, its middle no farther from the true axis than 0.25 sizes (or 0.8 mm), its
+place along the axis within the true extent (2 mm room), and its size within a factor of 1.6. Kinds do not matter for that: the judge counts
+wrong kinds apart.  Errors are those of numbers with a stated standard deviation.
 """
 
 from collections import defaultdict
@@ -10,11 +10,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-# kinds that are looked for; edges, corners, planes are not judged here
+# judged kinds; edges, corners, planes do not count here
 KINDS = ("hole", "slot", "pocket", "boss", "notch")
-# a number of the file and what divides its error
+# a number of the file and the name of its standard deviation
 STATED = {"diameter_mm": "diameter", "width_mm": "width", "length_mm": "length", "depth_mm": "depth"}
-# share of a wall that has to be touched before its feature is required
+# touched share of a wall from which on its feature counts as required
 TOUCHED = 0.4
 
 
@@ -60,7 +60,7 @@ def is_of(found, true):
 def judge(found, part_features, is_required):
     """The verdict on found features, as dictionaries of the features file in the frame of the part.
 
-    - is_required: for each true feature whether it has to be found.
+    - is_required: for each true feature whether a program has to find it.
     """
     verdict = Verdict()
     found = [feature for feature in found if feature["kind"] in KINDS]

@@ -1,7 +1,7 @@
-"""A part: a solid of manifold3d, and the features that were cut into it or put on it.
+"""A part: a solid of manifold3d, and its features, cut into it or put on it.
 
-Lengths in mm. Each feature keeps the number that manifold3d gives the faces of its tool, so the label of every face of the finished part
-is exact, however tools cross.
+Lengths in mm. Each feature keeps the number that manifold3d gives the faces of its tool, so the label of every face of the finished part is
+exact, for any crossings of tools.
 """
 
 from dataclasses import dataclass, field
@@ -37,7 +37,7 @@ def cone(radii, low, high):
 
 
 def rounded(length, width, corner):
-    """A rectangle about the origin with rounded corners; a stadium where the corner is half the width."""
+    """A rectangle about the origin with rounded corners; a stadium if the corner is half the width."""
     if corner <= 0:
         return CrossSection.square([length, width], center=True)
     corner = min(corner, width / 2)
@@ -56,7 +56,7 @@ def frame(origin, axis, direction=None):
 
 @dataclass
 class Feature:
-    """What was cut or put on: the fields are those of the features file, lengths in mm."""
+    """A cut or an addition: the fields are those of the features file, lengths in mm."""
 
     kind: str
     center_mm: np.ndarray
@@ -68,13 +68,13 @@ class Feature:
     floor: list = field(default_factory=list)
     # the smallest width that a ball has to go through, mm
     entry_mm: float = 0.0
-    # whether a program need not find it: what it is called is open, or it is cut by another
+    # whether a program need not find it: its kind is ambiguous, or another feature cuts it
     is_optional: bool = False
     remark: str = ""
 
 
 class Part:
-    """A solid and its features, while it is being made."""
+    """A solid and its features, under construction."""
 
     def __init__(self, blank):
         self.solid = blank.as_original()

@@ -1,7 +1,7 @@
-"""python -m machined.plots OUT.png VERDICTS.json...: what was found, what was invented, and errors over stated deviations, by kind and world.
+"""python -m machined.plots OUT.png VERDICTS.json...: found and invented features, and errors over stated deviations, by kind and world.
 
-The files are those of `python -m machined --json`. Bars say how many of how many; an interval around a share is that of Wilson at 95 %, one around
-a ratio that of the chi-squared distribution at 95 %. Grey bands are what is demanded.
+The files are those of `python -m machined --json`. Bars give counts out of totals; an interval around a share is that of Wilson at 95 %,
+one around a ratio that of the chi-squared distribution at 95 %. Grey bands are the requirements.
 """
 
 import argparse

@@ -1,7 +1,7 @@
 """python -m machined.sheet OUT.png FOLDER... [--columns N]: parts side by side, each as scanned, as refined, and with the features found.
 
-The folders are those of `python -m machined`. Faces seen from behind are red; holes are drawn blue, notches violet, slots orange, pockets yellow,
-bosses green, cylinders grey. Drawn by a depth buffer in numpy: it needs no display.
+The folders are those of `python -m machined`. Red faces show their backs; holes are blue, notches violet, slots orange, pockets yellow,
+bosses green, cylinders grey. A depth buffer in numpy draws them: it needs no display.
 """
 
 import argparse
@@ -93,7 +93,7 @@ def with_features(image, features, camera):
         if not len(points):
             continue
         line = camera.pixels(points)[:, :2]
-        # so close together that no gap is left
+        # dense enough to leave no gap
         steps = np.linspace(0, 1, 20)[:, None, None]
         line = ((1 - steps) * line[:-1] + steps * line[1:]).reshape(-1, 2).round().astype(int)
         for dx, dy in [(0, 0), (1, 0), (0, 1)]:

@@ -1,15 +1,16 @@
-"""python -m machined.surfaces OUT [--json FILE]: refined surfaces of random parts beside what other methods make of the same contacts.
+"""python -m machined.surfaces OUT [--json FILE]: refined surfaces of random parts beside other methods on the same contacts.
 
-OUT is the folder of `python -m machined`. Each other method sees the scan and all contacts at once, the contacts as touchup compensated them:
+OUT is the folder of `python -m machined`. Each other method sees the scan and all contacts at once, the contacts with touchup's
+compensation:
 
-- scan: as it is.
-- poisson: screened Poisson reconstruction (Kazhdan and Hoppe 2013, by pymeshlab) of the scan without what is near contacts, and the contacts.
+- scan: unchanged.
+- poisson: screened Poisson reconstruction (Kazhdan and Hoppe 2013, by pymeshlab) of the contacts and the scan away from them.
 - carve: signed distance of the scan on voxels, without the balls and with material behind contacts; marching cubes.
-- gaussian_process: implicit surface by regression (Williams and Fitzgibbon 2006): zero on contacts and scan, one radius on the centres of the
-  ball, less below; of the nearest observations to each voxel.
+- gaussian_process: implicit surface by regression (Williams and Fitzgibbon 2006): zero on contacts and scan, one radius on the centres of
+  the ball, less below; of the nearest observations to each voxel.
 
-Distances are by libigl, from samples of one surface to the other: truth to mesh where the truth is within 1 mm of a true contact, mesh to truth
-where the nearest truth is. Signs and tangents of neither are used.
+libigl measures distances from samples of one surface to the other: truth to mesh if the truth is within 1 mm of a true contact, mesh to
+truth if the nearest truth is. The comparison uses signs and tangents of neither.
 """
 
 import argparse
@@ -29,9 +30,9 @@ from scipy.spatial.transform import Rotation
 # voxels of the implicit surfaces, and how far from contacts they go, mm
 VOXEL_MM = 0.35
 BAND_MM = 1.6
-# contacts of the other methods are thinned to this, mm
+# spacing of the contacts for the other methods, mm
 THIN_MM = 0.3
-# the scan is left out nearer to a contact than this, mm
+# distance from a contact below which the scan drops out, mm
 REPLACED_MM = 1.5
 # behind a contact there is material over this, mm
 BEHIND_MM = 1.0
@@ -45,7 +46,7 @@ OFF_MM = 0.8
 # bounds the memory of the regression
 PLACES_AT_ONCE = 50_000
 POISSON_DEPTH = 8
-# of Poisson's closed surface what is farther from all points is left out, mm
+# distance from all points above which Poisson's closed surface drops out, mm
 POISSON_NEAR_MM = 2.5
 TOUCHED_MM = 1.0
 SAMPLES = 60_000
@@ -93,7 +94,7 @@ def distances(points, mesh):
 
 
 def errors(touched, mesh):
-    """Mean distances of truth to mesh and of mesh to truth where the part was touched, mm."""
+    """Mean distances of truth to mesh and of mesh to truth in the touched region, mm."""
     truth, _ = trimesh.sample.sample_surface(touched.truth, SAMPLES, seed=1)
     truth = truth[touched.contacts.query(truth)[0] < TOUCHED_MM]
     points, _ = trimesh.sample.sample_surface(mesh, SAMPLES, seed=2)
@@ -103,7 +104,7 @@ def errors(touched, mesh):
 
 
 def scan_beside(touched):
-    """Points of the scan away from contacts and from where the ball was, with normals."""
+    """Points of the scan away from contacts and outside of the ball's path, with normals."""
     points, faces = trimesh.sample.sample_surface(touched.scan, 40_000, seed=3)
     normals = touched.scan.face_normals[faces]
     is_kept = cKDTree(touched.points).query(points)[0] > REPLACED_MM
@@ -153,7 +154,7 @@ CORNERS = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0
 
 def carve(touched, band):
     values = band.signed.copy()
-    # the material behind the nearest contact, then what the ball was in
+    # the material behind the nearest contact, then the space that the ball swept
     distance, nearest = cKDTree(touched.points).query(band.places)
     off = band.places - touched.points[nearest]
     height = (off * touched.normals[nearest]).sum(axis=1)

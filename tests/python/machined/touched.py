@@ -16,7 +16,7 @@ from .part import Part
 
 WORLDS = ["workshop_stylus", "ur", "optical_tracker"]
 SIDES = {"shaft": "z,y,-y,x", "bracket": "z,-x,x", "sheet": "z"}
-# a point of a wall is touched when a contact is within this, mm
+# distance from a contact within which a point of a wall counts as touched, mm
 NEAR_MM = 1.0
 # room that a ball needs beyond its own width to go in, mm
 ROOM_MM = 1.0
@@ -31,7 +31,7 @@ class Result:
     name: str
     world: str
     part: Part
-    # of each feature the share of its wall that was touched
+    # touched share of each feature's wall
     shares: list
     verdict: Verdict
     # name of its folder
@@ -70,7 +70,7 @@ class Result:
         }
 
     def lines(self):
-        """What went wrong, one line each."""
+        """Failures, one line each."""
         share_of = {id(feature): share for feature, share in zip(self.part.features, self.shares)}
         for feature in self.verdict.missed:
             yield f"{self.name}: missed {described(feature)} (touched {share_of[id(feature)]:.0%})"
@@ -85,7 +85,7 @@ class Result:
 
 
 class Totals:
-    """What several parts add up to."""
+    """Sums over several parts."""
 
     def __init__(self):
         self.counts = defaultdict(lambda: dict.fromkeys(["required", "missed", "false", "found", "kind"], 0))
@@ -134,7 +134,7 @@ def simulated(touchup, folder, seed, family, world, scanner):
 
 
 def checked_scene(touchup, folder):
-    """The scene of a world, with what `touchup doctor` says of a clock that drifts: what a user does with it."""
+    """The scene of a world, with the clock drift that `touchup doctor` reports, as a user would enter it."""
     scene = folder / "scene.yaml"
     done = run([touchup, "doctor", folder / "scan.ply", folder / "touch.mcap", "--scene", scene, "--json"])
     # 3: surely wrong, which a clock that drifts is; 4: the recordings lose messages on purpose
@@ -163,7 +163,7 @@ def refined(touchup, folder, world):
 
 
 def into_part(features, folder, world):
-    """The features in the frame of the part: where a world tells the place of the scan, its error goes out again."""
+    """The features in the frame of the part: this removes the error of a world's told place of the scan."""
     if not world:
         return features
     place = json.loads((folder / "truth.json").read_text())["scan_to_space"]
@@ -182,7 +182,7 @@ def into_part(features, folder, world):
 
 
 def touched_shares(part, mesh, labels, contacts):
-    """For each feature the share of its wall that was touched."""
+    """For each feature the touched share of its wall."""
     tree = cKDTree(contacts) if len(contacts) else None
     shares = []
     for feature in part.features:

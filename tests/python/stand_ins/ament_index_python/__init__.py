@@ -1,6 +1,6 @@
-"""Stands in for ament_index_python where ROS is not installed: looks packages up below AMENT_PREFIX_PATH.
+"""Stands in for ament_index_python on a machine without ROS: looks packages up below AMENT_PREFIX_PATH.
 
-Debian's rosidl and xacro's $(find) ask it where a package keeps its files.
+Debian's rosidl and xacro's $(find) ask it for the folder of a package.
 """
 
 import os

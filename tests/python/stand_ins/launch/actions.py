@@ -4,7 +4,7 @@ from launch.substitutions import perform
 
 
 class Action:
-    """Something to be done."""
+    """An action of a launch file."""
 
     def __init__(self, *, condition=None):
         self.condition = condition
@@ -32,7 +32,7 @@ class DeclareLaunchArgument(Action):
 
 
 class LogInfo(Action):
-    """Writes a line; here it is kept in the context."""
+    """Writes a line; here the context keeps it."""
 
     def __init__(self, *, msg, condition=None):
         super().__init__(condition=condition)
@@ -71,7 +71,7 @@ class IncludeLaunchDescription(Action):
         self.source, self.arguments = launch_description_source, list(launch_arguments or [])
 
     def execute(self, context):
-        """Sets the arguments and returns what is in the file."""
+        """Sets the arguments and returns the contents of the file."""
         for name, value in self.arguments:
             context.launch_configurations[name] = perform(value, context)
         return self.source.get_launch_description().entities

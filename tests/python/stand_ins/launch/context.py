@@ -1,8 +1,8 @@
-"""Where arguments live while a description is visited, and the visit."""
+"""Arguments during the visit of a description, and the visit."""
 
 
 class LaunchContext:
-    """Values of the arguments by name, the nodes that would be started, and the lines that would be written."""
+    """Values of the arguments by name, the nodes to start, and the lines to write."""
 
     def __init__(self, given):
         self.launch_configurations = dict(given)
@@ -10,7 +10,7 @@ class LaunchContext:
 
 
 def visit(entities, context):
-    """Executes entities one after the other, and what they return."""
+    """Executes entities one after the other, and the entities that they return."""
     for entity in entities:
         if entity.condition is None or entity.condition.evaluate(context):
             visit(entity.execute(context) or [], context)

@@ -1,4 +1,4 @@
-"""Text that is known only when it is launched."""
+"""Text with a value only at the launch."""
 
 import functools
 import shlex
@@ -21,7 +21,7 @@ class LaunchConfiguration:
         self.variable_name, self.default = variable_name, default
 
     def perform(self, context):
-        """It must have been declared or have a default."""
+        """An argument; it must have a declaration or a default."""
         if self.variable_name not in context.launch_configurations and self.default is None:
             raise RuntimeError(f"launch configuration '{self.variable_name}' does not exist")
         return context.launch_configurations.get(self.variable_name, self.default)
@@ -33,7 +33,7 @@ def ran(words):
 
 
 class Command:
-    """What a command prints."""
+    """Output of a command."""
 
     def __init__(self, command, *, on_stderr="fail"):
         assert on_stderr in ("fail", "ignore", "warn", "capture")

@@ -9,7 +9,7 @@ from launch_ros.parameter_descriptions import ParameterValue
 
 
 class Node(Action):
-    """Starts a node. Here it is kept in the context, with its command line as launch_ros makes it."""
+    """Starts a node. Here the context keeps it, with its command line as launch_ros makes it."""
 
     def __init__(
         self,
@@ -70,7 +70,7 @@ class Node(Action):
 
     @staticmethod
     def value(value, context):
-        """A parameter as launch_ros evaluates it: text is read as YAML, so that "1" is a number."""
+        """A parameter as launch_ros evaluates it: it reads text as YAML, so that "1" is a number."""
         if isinstance(value, ParameterValue):
             return value.evaluate(context)
         return value if isinstance(value, (bool, int, float)) else yaml.safe_load(perform(value, context))

@@ -5,7 +5,7 @@ from launch.substitutions import perform
 
 
 class ParameterValue:
-    """A value, or a substitution that is read as YAML unless `value_type` says what it is."""
+    """A value, or a substitution that reads as YAML unless `value_type` gives the type."""
 
     def __init__(self, value, *, value_type=None):
         self.value, self.value_type = value, value_type
