@@ -7,10 +7,9 @@
 #                                networks, fuzzing …), which writes its section of docs/results.md
 #   tests/all.sh --full          the quick checks and all shards
 #
-# Needs cargo, cargo-nextest, a C compiler and Python 3.11. All are built once, with the same features and the same profile.
-# Python packages go into target/python, logs into target/test-logs. Nothing is tried twice, and nothing that failed is excused.
-# A test that could not run is counted as skipped, with its reason. The last line is the count; the exit code is 0 only when
-# nothing failed.
+# Needs cargo, cargo-nextest, a C compiler and Python 3.11. One build with the same features and the same profile serves all. Python
+# packages go into target/python, logs into target/test-logs. No test runs twice, and no failure has an excuse. A test that could not run
+# counts as skipped, with its reason. The last line is the count; the exit code is 0 only without failures.
 set -uo pipefail
 cd "$(dirname "$0")/.." || exit 1
 command -v cargo-nextest > /dev/null || { echo "cargo-nextest is missing: cargo install --locked cargo-nextest" >&2; exit 2; }
@@ -22,11 +21,11 @@ reports=$target/test-logs
 logs=$reports/quick
 venv=$target/python
 wheel_crate=crates/touchup-python
-# members and features of every command of cargo: with others shared libraries would be built once more
+# members and features of every command of cargo: others would build shared libraries once more
 everything=(--workspace --features everything)
 stages=()
 
-# note OUTCOME NAME [REASON]: counts what has no report of its own
+# note OUTCOME NAME [REASON]: counts a check without a report of its own
 note() { printf '%s\t%s\t%s\n' "$1" "$2" "${3-}" >> "$logs/notes.tsv"; }
 
 # stage NAME COMMAND...: runs it, and notes how long it took
@@ -90,7 +89,7 @@ python_tests() {
   [ "$status" -le 1 ] && [ -e "$logs/$name.xml" ] || note failed "$name" "pytest ended with $status, see $logs/$name.log"
 }
 
-# the Python package as the wheel has it, with the module that was built with everything else: a wheel is built by a shard
+# the Python package as in the wheel, with the module of the common build: a shard builds a wheel
 install_package() {
   local site; site=$("$venv/bin/python" -c 'import sysconfig; print(sysconfig.get_path("purelib"))') || return 1
   rm -rf "$site/touchup"
@@ -99,7 +98,7 @@ install_package() {
   chmod +x "$venv/bin/touchup"
 }
 
-# from outside of the source tree, where no file of it is imported
+# outside of the source tree, so that the tests import no file of it
 package_tests() {
   local name=$1 outside tests=$PWD/$wheel_crate/tests; shift
   outside=$(mktemp -d)
@@ -112,7 +111,7 @@ quick_checks() {
   rm -rf "$logs" && mkdir -p "$logs" || exit 1
   # property tests try the same cases in every run, here; others in the shards
   export PROPTEST_RNG_SEED=1
-  # they arrive while the tests are built
+  # they arrive during the build of the tests
   python_packages > "$logs/pip.log" 2>&1 &
   packages=$!
   stage "build" build || return

@@ -12,10 +12,10 @@ markdown() { printf 'markdown\t%s\t%s\n' "$@" >> "$logs/section.tsv"; }
 # file PATH HEADING: a text
 file() { printf 'file\t%s\t%s\n' "$@" >> "$logs/section.tsv"; }
 
-# slow_rust FILTER: Rust tests at their full size, those too that are ignored for their slowness
+# slow_rust FILTER: Rust tests at their full size, including those ignored for their slowness
 slow_rust() { stage "Rust tests" rust_tests rust "${everything[@]}" --lib --bins --tests --run-ignored all --filterset "$1"; }
 
-# slow_python_packages REQUIREMENTS: what only slow proofs need, into the environment of the quick checks
+# slow_python_packages REQUIREMENTS: packages for slow proofs alone, into the environment of the quick checks
 slow_python_packages() {
   stage "Python packages" python_packages &&
     stage "more Python packages" "$venv/bin/python" -m pip install --quiet --disable-pip-version-check -r "$1" || note failed "Python packages"
@@ -55,8 +55,7 @@ weighed() {
   if [ "$weight" -le "$3" ]; then note passed "weight of the $1"; else note failed "weight of the $1" "$weight bytes, more than $3"; fi
 }
 
-# as they are handed out, in the release profile: the README's first command with nothing built before, and the wheel in an
-# environment of its own
+# as users get them, in the release profile: the README's first command without an earlier build, and the wheel in an environment of its own
 shard_3() {
   title "The first command, and the wheel"
   local wheel_venv=$target/wheel_python wheel begun=$SECONDS
@@ -91,7 +90,7 @@ shard_5() {
   stage "engines" package_tests engines test_ray.py test_engines.py test_mesh.py
 }
 
-# links and names in the documentation of the crates; the site, and what it shows beside what a forge shows
+# links and names in the documentation of the crates; the site against the forge
 shard_6() {
   title "Documentation, and judged cases"
   checked "documentation of the crates" env RUSTDOCFLAGS="-D warnings" cargo doc "${everything[@]}" --no-deps
@@ -113,7 +112,7 @@ shard_8() {
   text reconstruct::accuracy::other_tips_a_cone "A cone, six seeds"
 }
 
-# how well the surface is known
+# the uncertainty of the surface
 shard_17() {
   title "The uncertainty of the surface, its grid and its tips"
   slow_rust 'binary(rooms) & test(/^reconstruct::/) & !test(/^reconstruct::accuracy::/)'
@@ -139,7 +138,7 @@ shard_10() {
 
 shard_11() {
   title "Comparison, alignment, sessions and files"
-  # what is in no other shard
+  # everything outside of the other shards
   slow_rust 'binary(ros) | (binary(rooms) & !test(/^(features|form|haptic|mesh|probing|reconstruct|scene|sim|stylus)::/))'
 }
 
@@ -171,7 +170,7 @@ shard_14() {
   file "$logs/fuzz.log" "Executions, and edges of the code that they reached"
 }
 
-# of the node on r2r what it adds, as far as it goes where no ROS is installed; and the library without features
+# the parts of the node on r2r that run without ROS; and the library without features
 shard_15() {
   title "Other builds"
   checked "lint of r2r" cargo clippy --package touchup-node --lib --features r2r-check -- -D warnings
@@ -180,7 +179,7 @@ shard_15() {
   checked "lint of the wheel" cargo clippy --package touchup-python --features abi3 -- -D warnings
 }
 
-# the page of a session that is over, and what takes long in the documentation
+# the page of an ended session, and slow blocks of the documentation
 shard_16() {
   title "Replays, and blocks of the documentation"
   slow_python test_web_replay.py test_docs_code.py

@@ -1,4 +1,4 @@
-// How the page is built: one script, one style sheet, no inlined data, so that a strict Content-Security-Policy can hold.
+// Build of the page: one script, one style sheet, no inlined data, so that a strict Content-Security-Policy can hold.
 import { defineConfig } from "vite";
 
 /** Where `npm run dev` finds a node. */

@@ -13,5 +13,5 @@
 #SBATCH --output=slurm_%a.log
 touchup sweep run "$1" --job "$SLURM_ARRAY_TASK_ID" --results "$2"
 code=$?
-# 3 where it cannot be refined, and the table says why; 4 where it was refined from a damaged recording, and that is done
+# 3: refinement is impossible, and the table says why; 4: refined from a damaged recording, and done
 [ $code -eq 4 ] || exit $code

@@ -89,11 +89,11 @@ export class ArmPanel {
   private show(): void {
     const { arm } = this;
     this.element.hidden = arm === null;
-    // a plan is for one feature: another one is chosen, another plan is needed
+    // a plan is for one feature: another choice needs another plan
     if (this.model.selected !== this.target && (this.step === "planned" || this.step === "approved")) return this.go("choose");
     const stays = arm?.stays_because ?? null;
     this.recover.hidden = !this.needsRecovery && stays === null;
-    // one step at a time: what cannot be done yet takes no room
+    // one step at a time: later steps take no room
     const mayRun = this.step === "approved" || this.step === "running";
     this.plan.hidden = mayRun || !this.recover.hidden;
     this.approve.hidden = this.step !== "planned";

@@ -141,7 +141,7 @@ export class FeatureDetails {
   private showCurves(): void {
     const touches = this.model.touches.get(this.model.selected ?? -1) ?? [];
     const plots = touches.map((touch) => this.plots.get(touch) ?? curvePlot(touch));
-    // those that are drawn stay: each touch that comes costs one drawing
+    // existing plots stay: each new touch costs one drawing
     this.plots = new Map(touches.map((touch, i) => [touch, plots[i]]));
     const heading = touches.length > 0 ? [el("h3", { text: "curves" }), el("p", { class: "muted", text: "curvesHow" })] : [];
     this.curves.replaceChildren(...heading, ...plots);

@@ -77,7 +77,7 @@ export type Need =
 /** What is wanted most of a feature; null when all of its numbers are known within the tolerance (m, of U). */
 export function need(feature: NotedFeature, tolerance: number): Need | null {
   if (feature.status === Status.flagged || feature.fitted_to !== FittedTo.touches) {
-    // too little of it was touched for numbers from touches
+    // too few touches for numbers from touches
     return (feature.touched ?? 0) > 0 ? { kind: "little", share: feature.touched ?? 0 } : { kind: "untouched" };
   }
   const asked = sizes(feature).filter((size) => !size.isAtLeast);

@@ -43,7 +43,7 @@ export function drawFeatures(lines: Lines, features: Feature[], selected: number
     const colour = new Color(feature.id === selected ? FEATURE_COLOURS.selected : colourOf(feature));
     const outline = outlineOf(feature);
     for (let i = 0; i + 1 < outline.length; i++) {
-      // a flag is dashed: it is a wish, nothing measured
+      // a flag has dashes: it is a wish, not a measurement
       if (feature.status === Status.flagged && i % 2 === 1) continue;
       places.push(...outline[i].toArray(), ...outline[i + 1].toArray());
       for (let end = 0; end < 2; end++) colours.push(colour.r, colour.g, colour.b);

@@ -60,7 +60,7 @@ export class Guidance {
     const reached = asked.filter((feature) => need(feature, tolerance) === null);
     this.target = null;
     for (const feature of asked) {
-      // somebody is content with it as it is
+      // the operator has accepted it
       if (feature.is_locked || feature.mark === "accepted") continue;
       const most = this.target === null ? 0 : urgency(this.target, tolerance);
       if (urgency(feature, tolerance) > most) this.target = feature;

@@ -35,7 +35,7 @@ export class HoldToRun {
     button.addEventListener("keydown", (event) => this.keyDown(event));
     button.addEventListener("keyup", (event) => KEYS.has(event.key) && this.end());
     button.addEventListener("blur", () => this.end());
-    // a long press would else open a menu, and the finger would be lost
+    // a long press would else open a menu, and the page would lose the finger
     button.addEventListener("contextmenu", (event) => event.preventDefault());
     window.addEventListener("blur", () => this.end());
     window.addEventListener("pagehide", () => this.end());

@@ -64,7 +64,7 @@ export class MeshMaterial extends ShaderMaterial {
       vertexShader: VERTEX,
       fragmentShader: FRAGMENT,
       side: DoubleSide,
-      // lines on the surface are to be seen
+      // keeps lines on the surface visible
       polygonOffset: true,
       polygonOffsetFactor: 1,
       polygonOffsetUnits: 1,

@@ -48,7 +48,7 @@ export function buildPage(connection: Connection, replayed: string | null): void
     onSelect: (id) => model.select(model.selected === id ? null : id),
     onTap: (hit, x, y) => {
       flagMenu.close();
-      // in a replay there is nothing to be done with a place
+      // a place of a replay has no menu
       if (hit === null || replayed !== null) return model.select(null);
       picture.showMark(hit.point);
       flagMenu.open(hit.point, isTouched(store, hit.face), x, y);
@@ -152,7 +152,7 @@ export function buildPage(connection: Connection, replayed: string | null): void
 
   function listenToMesh(): void {
     feedMesh(connection, store, {
-      // a replay that begins again is seen from where it was
+      // a replay that begins again keeps its view
       onOther: () => replayed === null && picture.camera.forget(),
       onGap: () => notices.bad(t("failedMesh")),
       onChange: () => {

@@ -128,7 +128,7 @@ export class Picture {
       const [x, y] = [event.clientX - left, event.clientY - top];
       onTap(this.pickAt(x, y), x, y);
     });
-    // by keyboard: what is in the middle of the picture
+    // by keyboard: the middle of the picture
     canvas.addEventListener("keydown", (event) => {
       if (event.key !== "Enter") return;
       const { width, height } = this.stage.size;

@@ -69,7 +69,7 @@ export class Replay {
     this.show();
     if (state.is_ready) return;
     if (state.error === null) return this.onReading();
-    // another try would be refused as well
+    // the node would refuse another try as well
     this.connection.end();
     this.onRefused();
   }

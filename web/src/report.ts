@@ -107,7 +107,7 @@ export class Report {
     const number = ++this.readings;
     const answer = await fetch(fileAddress(session, "results.json"));
     const inspection = answer.ok ? ((await answer.json()) as Inspection) : null;
-    // another one was asked for meanwhile
+    // a later request has replaced this one
     if (number !== this.readings) return;
     if (inspection === null) this.fail(t("reportUnread"));
     else this.result.replaceChildren(reportSummary(session, inspection));

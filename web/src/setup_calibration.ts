@@ -72,7 +72,7 @@ export class CalibrationCard {
     );
     const head = el("span", { class: "row start" }, el("strong", { text: title }), this.pill);
     this.details = el("details", {}, el("summary", {}, head, this.cost), this.inner);
-    // what is folded away is nowhere, for a finger and for a screen reader
+    // hides folded parts from fingers and screen readers
     this.details.addEventListener("toggle", () => (this.inner.hidden = !this.details.open));
     this.element = el("li", { class: "calibration" }, this.details);
   }
@@ -95,7 +95,7 @@ export class CalibrationCard {
     this.showResult(own, scene);
     this.use.hidden = own?.state !== "found" || own.is_used;
     this.use.disabled = !this.desk.mayChange || isBusy;
-    // what comes of it is seen, also where somebody else began it
+    // shows the result, even of a calibration that somebody else began
     const now = own === null ? "" : `${own.state} ${own.file}`;
     if (now !== this.drawn.state && own !== null) {
       this.details.open = true;
@@ -180,7 +180,7 @@ export class CalibrationCard {
   /** Sends a recording, which is calibrated by then, or a table, which is chosen then. */
   private async upload(): Promise<void> {
     const file = this.input.files?.[0];
-    // the same file can be sent again
+    // lets the user send the same file again
     this.input.value = "";
     if (file === undefined || this.state === null) return;
     const { largest_upload } = this.state;
@@ -194,7 +194,7 @@ export class CalibrationCard {
       const name = await sendFile(file, note).finally(() => (this.sent = null));
       const isTable = name.toLowerCase().endsWith(TABLES);
       if (isTable) this.points = name;
-      // points alone are of use when the recording is chosen
+      // points alone serve a recording already chosen
       if (isTable || (this.needsPoints && this.points === null)) return changeSetup("look", null);
       return changeSetup("calibrate", { what: this.name, recording: name, points: this.needsPoints ? this.points : null });
     });

@@ -93,7 +93,7 @@ export function buildSetupPage(first: SetupState): void {
     const found = isWorking ? state : await askSetup();
     if (found === "running") return location.reload();
     if (found === null) tellNote(t("setupLost"));
-    // an answer that was asked for before a change would undo what is shown
+    // an answer to a request before a change would undo the display
     else if (!isWorking && found !== state) take(found);
     setTimeout(look, LOOK);
   }
@@ -102,7 +102,7 @@ export function buildSetupPage(first: SetupState): void {
     const before = current();
     state = found;
     show();
-    // the scan that this page chose has been read
+    // the node has read the scan that this page chose
     const now = current();
     const isHere = document.activeElement === null || document.activeElement === document.body || steps.some(({ element }) => element.contains(document.activeElement));
     if (now !== before && isHere && desk.mayChange) steps.find(({ name }) => name === now)?.focus();

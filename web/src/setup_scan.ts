@@ -91,7 +91,7 @@ export class ScanStep extends SetupStep {
 
   private async upload(): Promise<void> {
     const file = this.input.files?.[0];
-    // the same file can be sent again
+    // lets the user send the same file again
     this.input.value = "";
     if (file === undefined || this.state === null) return;
     const { largest_upload } = this.state;

@@ -31,7 +31,7 @@ export class StatusBar {
   ) {
     const setup = button("check", "setupOpen", onSetup, "square", true);
     const share = button("share", "share", onShare, "square", true);
-    // of a replay nothing is to be checked, and nobody is to be let in
+    // a replay has no setup and no links to share
     setup.hidden = share.hidden = model.replayed !== null;
     const right = el("div", { class: "choices" }, setup, share, settingsMenu(onTheme));
     this.element = el("header", { class: "bar" }, this.part, this.line, this.input, this.role, right);

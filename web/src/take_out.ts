@@ -33,7 +33,7 @@ export class TakeOut {
   /** Looks for the touch at a place of the part, m. */
   look(place: Place): void {
     if (!this.model.mayOperate) return;
-    // what is not found is not offered; whether the line holds is said elsewhere
+    // without a touch there is no offer; the status bar shows the connection
     this.choice.look(place, this.model.frame).catch(() => this.choice.forget());
   }
 

@@ -37,7 +37,7 @@ export const texts = {
   themeDark: ["Dark", "Dunkel", "Oscuro"],
   whyNoLine: ["Not connected: what you see is how it was.", "Nicht verbunden: zu sehen ist, wie es zuletzt war.", "Sin conexión: se ve el último estado."],
   whyLookOnly: ["You are looking only. To operate, open the link for operating that the node's terminal shows.", "Sie sehen nur zu. Zum Bedienen öffnen Sie den Link zum Bedienen, den das Terminal des Knotens zeigt.", "Solo puede mirar. Para operar, abra el enlace de operación que muestra la terminal del nodo."],
-  // the bar of what is done all the time
+  // the bar of frequent actions
   toolbar: ["Session", "Sitzung", "Sesión"],
   undo: ["Undo", "Rückgängig", "Deshacer"],
   redo: ["Redo", "Wiederholen", "Rehacer"],
@@ -276,7 +276,7 @@ export const texts = {
   cancelled: ["Cancelled: the arm draws back, the session is paused.", "Abgebrochen: Der Arm zieht sich zurück, die Sitzung ist angehalten.", "Cancelado: el brazo se retira y la sesión queda en pausa."],
   stopped: ["Stopped: the arm stays where it is.", "Gestoppt: Der Arm bleibt, wo er ist.", "Parado: el brazo se queda donde está."],
   noEmergencyStop: ["This stop is not an emergency stop. In danger press the red button at the cell.", "Dieser Stopp ist kein Not-Halt. Bei Gefahr den roten Knopf an der Zelle drücken.", "Esta parada no es una parada de emergencia. En peligro, pulse el botón rojo de la celda."],
-  // what went wrong
+  // failures
   failedRefused: ["That did not work: {reason}", "Das ging nicht: {reason}", "No ha funcionado: {reason}"],
   failedLost: ["The connection was lost before an answer came.", "Die Verbindung brach vor der Antwort ab.", "Se perdió la conexión antes de la respuesta."],
   failedLate: ["No answer came in time.", "Es kam rechtzeitig keine Antwort.", "No llegó respuesta a tiempo."],

@@ -79,7 +79,7 @@ describe("the store", () => {
       store.apply(model.edit(10 + 5 * edit));
       expectSame(store, model);
     }
-    // and a late whole state, over what is left of another version
+    // and a late whole state, over the rest of another version
     for (let edit = 0; edit < 10; edit++) model.edit(600);
     store.apply(model.whole());
     expectSame(store, model);

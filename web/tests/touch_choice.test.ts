@@ -67,7 +67,7 @@ it("a touch goes and comes by its name", () => {
 });
 
 it("a face is touched where one of its corners is", () => {
-  // vertex 2 is touched, 3 interpolated
+  // support of vertex 2: touched, of vertex 3: interpolated
   const quality = new Uint8Array([0, 0, 0, 1, 0, 0, 0, 1, 1, 0, 0, 1, 2, 0, 0, 1]);
   const store = { corners: new Uint32Array([0, 1, 3, 0, 1, 2]), quality } as MeshStore;
   expect([isTouched(store, 0), isTouched(store, 1)]).toEqual([false, true]);

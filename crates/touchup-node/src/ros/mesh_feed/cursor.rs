@@ -1,4 +1,4 @@
-//! What one follower of the mesh has, and its way to a version: messages from version to version,
+//! State of one follower of the mesh, and its way to a version: messages from version to version,
 //! and the whole state for a new follower.
 
 use std::vec::IntoIter;
