@@ -1,8 +1,7 @@
 /**
- * Where an arm holds the probe: plan first, then approve, then hold to run; cancel and stop always at hand.
+ * Controls of an arm that holds the probe: plan first, then approve, then hold to run; cancel and stop always at hand.
  *
- * The plan is a dry run: its path is drawn on the part, nothing moves. Only an approved plan can be run, and only while somebody
- * holds the button.
+ * The plan is a dry run: the part shows its path, nothing moves. Only an approved plan can run, and only while somebody holds the button.
  */
 import { button, el, say, write } from "./dom";
 import { title } from "./feature_facts";
@@ -13,7 +12,7 @@ import type { Model } from "./model";
 import type { Operating } from "./operating";
 import { settings } from "./settings";
 
-/** A plan on a large mesh takes so long at most, and a probing, ms. */
+/** Limits of the time for a plan on a large mesh, and for a probing, ms. */
 const PLAN_WITHIN = 120_000;
 const PROBE_WITHIN = 30 * 60_000;
 
@@ -157,7 +156,7 @@ export class ArmPanel {
     }
   }
 
-  /** Stops and draws back; the node is paused afterwards, as there is no call that only cancels. */
+  /** Stops and draws back; the node pauses afterwards, since no call only cancels. */
   private async cancel(): Promise<void> {
     this.hold.end();
     await this.operating.call<Answer>("~/pause", { data: true }, () => t("cancelled"));

@@ -1,4 +1,4 @@
-/** An arrow in space, and lines of several pixels: what the tip, the force, the next touch and the path are drawn with. */
+/** An arrow in space, and lines of several pixels: the shapes of the tip, the force, the next touch and the path. */
 import { ConeGeometry, CylinderGeometry, Group, Mesh, MeshLambertMaterial, Vector3 } from "three";
 
 const UP = new Vector3(0, 1, 0);

@@ -1,4 +1,4 @@
-/** The numbers of a calibration as an operator reads them: each with its expanded uncertainty, and what the fit leaves. */
+/** The numbers of a calibration as an operator reads them: each with its expanded uncertainty, and the residual of the fit. */
 import { t } from "./language";
 import { decimal, expanded, measured, roundedUncertainty } from "./numbers";
 import type { CalibrationChoice, PayloadFound, ScanFound, TipFound, VectorEstimate } from "./setup_state";
@@ -9,7 +9,7 @@ export type FoundCalibration = { what: "tip"; found: TipFound } | { what: "paylo
 const RESIDUAL_DECIMALS = 3;
 const AXES = ["x", "y", "z"] as const;
 
-/** What was found, without the rest. */
+/** The result, without the rest. */
 export function found(choice: Extract<CalibrationChoice, { state: "found" }>): FoundCalibration {
   return { what: choice.what, found: choice.found } as FoundCalibration;
 }

@@ -8,7 +8,7 @@ import type { Stage } from "./stage";
 
 export type ViewName = "whole" | "top" | "front" | "side";
 
-/** From the part to the camera. Not quite from above: there the camera would not know what is up. */
+/** From the part to the camera. Not quite from above: there the camera would have no upward direction. */
 const DIRECTIONS: Record<ViewName, Vector3> = {
   whole: new Vector3(0.55, -1, 0.85),
   top: new Vector3(0, -1e-3, 1),
@@ -57,7 +57,7 @@ export class CameraMan {
     this.stage.ask();
   }
 
-  /** When the part is seen for the first time: all of it. */
+  /** Shows all of the part at its first sight. */
   frameOnce(): void {
     if (!this.hasFramed && this.radius() !== null) this.show("whole");
   }
@@ -129,7 +129,7 @@ export class CameraMan {
     position.sub(this.controls.target).multiplyScalar(by).add(this.controls.target);
   }
 
-  /** Near and far planes for where the camera is: the depth of the picture is not endless. */
+  /** Near and far planes for the place of the camera: the depth of the picture is finite. */
   private keepInReach(): void {
     const radius = this.radius();
     if (radius === null) return;
@@ -143,7 +143,7 @@ export class CameraMan {
     camera.updateProjectionMatrix();
   }
 
-  /** From the middle of the part, so that every corner of its box is in the picture as the camera is turned now. */
+  /** From the middle of the part, so that every corner of its box is in the picture at the camera's present turn. */
   private distanceForAll(): number {
     const { camera } = this.stage;
     const { low, high } = this.store;

@@ -1,11 +1,11 @@
 /**
- * Reads what DDS sends: plain CDR (XCDR1), little endian.
+ * Reads the encoding of DDS: plain CDR (XCDR1), little endian.
  *
- * Numbers lie at multiples of their own size, counted from the first byte after the encapsulation; where that byte is 8-aligned in
- * its buffer, arrays of numbers are views into it and nothing is copied.
+ * Numbers lie at multiples of their own size, counted from the first byte after the encapsulation; if the buffer aligns that byte to 8,
+ * arrays of numbers are views into it without a copy.
  */
 
-/** The bytes are not what they should be; the message says where and why. For the log, not for the operator. */
+/** The bytes are no valid encoding; the message names the place and the reason. For the log, not for the operator. */
 export class CdrError extends Error {}
 
 /** Name of little endian CDR in the four bytes before the body. */
@@ -19,7 +19,7 @@ export class CdrReader {
   private readonly origin: number;
   private at: number;
 
-  /** @param start where the encapsulation begins; the body after it has to be 8-aligned. */
+  /** @param start offset of the encapsulation; the buffer has to align the body after it to 8. */
   constructor(
     private readonly buffer: ArrayBuffer,
     start: number,

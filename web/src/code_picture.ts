@@ -4,7 +4,7 @@ import { t } from "./language";
 
 const QUIET = 4;
 
-/** - `rows`: 1 where it is dark. */
+/** - `rows`: 1 for a dark module. */
 export function codePicture(rows: string[]): SVGElement {
   const side = rows.length + 2 * QUIET;
   const background = svg("path", { class: "light", d: `M0 0h${side}v${side}h-${side}z` });

@@ -1,8 +1,8 @@
 /**
- * What the colours of the mesh mean: categories (what a place rests on) and scales (how large a number is), for shader and legend.
+ * Meaning of the mesh colours: categories (support of a place) and scales (size of a number), for shader and legend.
  *
- * Categories are from the palette of Okabe and Ito; the scales grow in lightness, or from a light middle to two dark ends, so that
- * they read without telling red from green.
+ * Categories are from the palette of Okabe and Ito; the scales grow in lightness, or from a light middle to two dark ends, so that they
+ * read without telling red from green.
  */
 import { FAR, type MeshStore } from "./mesh_store";
 import type { TextKey } from "./texts";
@@ -28,9 +28,9 @@ export interface ColourMode {
 
 const SEQUENTIAL = ["#440154", "#472d7b", "#3b528b", "#2c728e", "#21918c", "#28ae80", "#5ec962", "#addc30", "#fde725"];
 const DIVERGING = ["#08306b", "#1f5fa8", "#5b9bd0", "#b3d2e8", "#f4f4f2", "#f3c9a5", "#e08f4f", "#b85a17", "#7a3200"];
-/** Steps of every scale; the shader has an array of so many. */
+/** Steps of every scale; the shader has an array of this length. */
 export const SCALE_STEPS = SEQUENTIAL.length;
-/** Where a number is not known. */
+/** Colour of an unknown number. */
 export const UNKNOWN_COLOUR = "#8d969e";
 
 export const COLOUR_MODES: ColourMode[] = [

@@ -1,21 +1,21 @@
 /**
  * The line to the node: one WebSocket, which comes back by itself, with topics coming in, calls going out, and bytes of the mesh.
  *
- * A line on which nothing is heard for 10 s counts as lost. After a loss it is tried again in 1, 2, 4, then every 8 s.
+ * A line with a silence of 10 s counts as lost. After a loss it tries again in 1, 2, 4, then every 8 s.
  */
 import type { TopicName, Topics } from "./messages";
 
 export const SUBPROTOCOL = "touchup.v1";
-/** Nothing heard for so long: the line is lost, ms. */
+/** Silence that counts as a lost line, ms. */
 export const SILENCE = 10_000;
 /** Waits before the next try, ms; the last one repeats. */
 export const WAITS = [1000, 2000, 4000, 8000];
-/** A call that is not answered for so long has failed, ms. */
+/** Time without an answer after which a call has failed, ms. */
 const ANSWER_WITHIN = 15_000;
 
 export type LineState = { kind: "connecting" } | { kind: "connected" } | { kind: "waiting"; seconds: number } | { kind: "ended" };
 
-/** Why a call failed; `sentence` is the node's own, null where it gave none. */
+/** Reason of a failed call; `sentence` is the node's own, null if it gave none. */
 export class CallError extends Error {
   constructor(
     readonly reason: "refused" | "lost" | "late",

@@ -1,4 +1,4 @@
-/** The bar of what an operator does all the time: undo, redo, pause, save, new session, report, sessions. */
+/** The bar of an operator's frequent actions: undo, redo, pause, save, new session, report, sessions. */
 import { ask, button, el, picture, say } from "./dom";
 import { t } from "./language";
 import type { Answer } from "./messages";

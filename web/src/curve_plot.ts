@@ -12,7 +12,7 @@ const HEIGHT = 110;
 const LEFT = 34;
 const BOTTOM = 20;
 const TOP = 8;
-/** Points of a line at most: more than pixels nobody sees. */
+/** Points of a line at most: more than pixels are invisible. */
 const MOST_POINTS = 400;
 
 const VERDICTS = [
@@ -61,7 +61,7 @@ function numbers(from: Num[]): number[] {
   return from.map((number) => number ?? 0);
 }
 
-/** Never empty, so that nothing is divided by zero. */
+/** Never empty, so that no division is by zero. */
 function range(of: number[]): [number, number] {
   let [low, high] = [Infinity, -Infinity];
   for (const number of of) {

@@ -1,8 +1,7 @@
 /**
- * Which stretches of an array changed since they were last uploaded to the GPU.
+ * Stretches of an array that changed since their last upload to the GPU.
  *
- * Kept in blocks, so that marking costs one store; near stretches are joined until few are left, for each is a call of its own to
- * the driver.
+ * Blocks make marking cost one store; near stretches merge until few remain, for each is a call of its own to the driver.
  */
 
 /** Elements in a block: 12 kB of positions, below which a call costs more than its bytes. */
@@ -54,7 +53,7 @@ export class DirtyRanges {
   }
 }
 
-/** Joins the ranges with the smallest gaps between them until at most `most` are left. */
+/** Joins the ranges with the smallest gaps between them until at most `most` remain. */
 function joinNearest(ranges: Range[], most: number): void {
   const excess = ranges.length - most;
   if (excess <= 0) return;

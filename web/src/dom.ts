@@ -10,7 +10,7 @@ export interface Properties {
   id?: string;
   /** Key of the text that it shows. */
   text?: TextKey;
-  /** Key of its name, where it shows no words. */
+  /** Key of its name, for an element without words. */
   label?: TextKey;
   attributes?: Record<string, string>;
   onClick?: () => void;
@@ -40,12 +40,12 @@ export function say(element: HTMLElement, key: TextKey): void {
   write(element, t(key));
 }
 
-/** Shows words that are put together; the same ones again touch nothing, so that a screen reader stays quiet. */
+/** Shows composed words; the same ones again touch nothing, so that a screen reader stays quiet. */
 export function write(element: Element, words: string): void {
   if (element.textContent !== words) element.textContent = words;
 }
 
-/** A button with a picture and, unless only its name is wanted, words. */
+/** A button with a picture and, unless it needs only its name, words. */
 export function button(icon: IconName | null, text: TextKey, onClick: () => void, style = "", onlyIcon = false): HTMLButtonElement {
   const made = el("button", { class: `button ${style}`.trim(), attributes: { type: "button" }, onClick });
   if (icon !== null) made.append(picture(icon));
@@ -69,7 +69,7 @@ export function picture(name: IconName): SVGElement {
   return svg("svg", { class: "icon", viewBox: "0 0 24 24", "aria-hidden": "true" }, path);
 }
 
-/** Asks before something that cannot be taken back. */
+/** Asks before an irreversible action. */
 export function ask(question: TextKey, yes: TextKey): Promise<boolean> {
   return new Promise((resolve) => {
     const dialog = el("dialog", { class: "dialog", attributes: { "aria-labelledby": "question" } });

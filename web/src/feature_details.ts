@@ -1,6 +1,6 @@
 /**
- * One feature in full: its sizes with U, what they rest on, form, relations, the curves of its touches; and what can be done with
- * it. The buttons stay while the numbers change under them.
+ * One feature in full: its sizes with U, their support, form, relations, the curves of its touches; and its actions. The buttons stay while
+ * the numbers change under them.
  */
 import { button, el, say, write } from "./dom";
 import { curvePlot } from "./curve_plot";

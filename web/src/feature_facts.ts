@@ -1,6 +1,4 @@
-/**
- * What a feature says to an operator: its name, its sizes with U, and which of its numbers wants more touches.
- */
+/** Facts of a feature for an operator: its name, its sizes with U, and the number that needs touches most. */
 import { Vector3 } from "three";
 import { t } from "./language";
 import { type NotedFeature, FittedTo, Kind, Status, triple } from "./messages";
@@ -11,7 +9,7 @@ const KIND_TEXTS: TextKey[] = [
   "kindUnknown", "kindHole", "kindSlot", "kindPocket", "kindBoss", "kindEdge", "kindCorner", "kindPlane", "kindCylinder", "kindNotch",
 ];
 
-/** Kinds that somebody may flag, the likeliest first. */
+/** Kinds for a flag, the likeliest first. */
 export const FLAGGABLE = [
   Kind.hole, Kind.slot, Kind.pocket, Kind.boss, Kind.edge, Kind.corner, Kind.plane, Kind.cylinder, Kind.notch, Kind.unknown,
 ];
@@ -20,7 +18,7 @@ export function kindText(kind: number): TextKey {
   return KIND_TEXTS[kind] ?? "kindUnknown";
 }
 
-/** "Hole 3", or "Hole 3 · upper left" where it was named. */
+/** "Hole 3", or "Hole 3 · upper left" with a name of its own. */
 export function title(feature: NotedFeature): string {
   const plain = `${t(kindText(feature.kind))} ${feature.id}`;
   return feature.name ? `${plain} · ${feature.name}` : plain;
@@ -37,12 +35,12 @@ export interface Size {
   /** With U and unit. */
   words: string;
   value: number;
-  /** Expanded uncertainty, m; null where it is not known. */
+  /** Expanded uncertainty, m; null if unknown. */
   u: number | null;
   isAtLeast: boolean;
 }
 
-/** Every length that is known of it, the one that it is ordered by first. */
+/** Every known length of it, the principal one first. */
 export function sizes(feature: NotedFeature): Size[] {
   const size = (name: "diameter" | "width" | "length" | "depth"): Size | null => {
     const isAtLeast = name === "depth" && feature.depth_is_at_least;
@@ -74,7 +72,7 @@ export type Need =
   | { kind: "unknown"; touches: number }
   | { kind: "wide"; size: TextKey; u: number };
 
-/** What is wanted most of a feature; null when all of its numbers are known within the tolerance (m, of U). */
+/** Greatest need of a feature; null if all of its numbers are within the tolerance (m, of U). */
 export function need(feature: NotedFeature, tolerance: number): Need | null {
   if (feature.status === Status.flagged || feature.fitted_to !== FittedTo.touches) {
     // too few touches for numbers from touches
@@ -87,19 +85,19 @@ export function need(feature: NotedFeature, tolerance: number): Need | null {
   return widest.u <= tolerance ? null : { kind: "wide", size: widest.text, u: widest.u };
 }
 
-/** Whether the tolerance is asked of it: it has a size, and nobody threw it out. */
+/** Whether the tolerance applies to it: it has a size, and no rejection. */
 export function isAsked(feature: NotedFeature): boolean {
   return !isMinor(feature) && feature.mark !== "rejected";
 }
 
-/** How much a feature wants touches: U over the tolerance, endless where nothing is known. */
+/** Urgency of touches on a feature: U over the tolerance, infinite without a number. */
 export function urgency(feature: NotedFeature, tolerance: number): number {
   const wanted = need(feature, tolerance);
   if (wanted === null) return 0;
   return wanted.kind === "wide" ? wanted.u / tolerance : Infinity;
 }
 
-/** The one whose center is nearest, of those that somebody asks for. @param within farther than this none is, m. */
+/** The one with the nearest center, among those under the tolerance. @param within largest distance, m. */
 export function nearestTo(place: Vector3, features: NotedFeature[], within: number): NotedFeature | null {
   let nearest: NotedFeature | null = null;
   let least = within;

@@ -1,6 +1,6 @@
 /**
- * Features as lines on the part: rims of holes and bosses, outlines of slots and pockets, edges, and dashed circles around what is
- * only flagged. And the planned path of the arm. Lines are some pixels wide, however far the camera is.
+ * Features as lines on the part: rims of holes and bosses, outlines of slots and pockets, edges, and dashed circles around flags. And the
+ * planned path of the arm. Lines are some pixels wide, at any distance of the camera.
  */
 import { Color, Vector3 } from "three";
 import { LineMaterial } from "three/addons/lines/LineMaterial.js";
@@ -35,7 +35,7 @@ export class Lines extends LineSegments2 {
   }
 }
 
-/** Lines of all features that are shown; the selected one in its own colour. */
+/** Lines of all visible features; the selected one in its own colour. */
 export function drawFeatures(lines: Lines, features: Feature[], selected: number | null): void {
   const places: number[] = [];
   const colours: number[] = [];

@@ -98,7 +98,7 @@ export class FeatureList {
   }
 }
 
-/** What is to be said of it in a few words, with a sign that needs no colour. */
+/** State of a feature in a few words, with a sign that needs no colour. */
 export function judgement(feature: NotedFeature): [words: string, level: "good" | "open" | "plain"] {
   const lock = feature.is_locked ? ` · ${t("locked")}` : "";
   if (feature.mark === "accepted") return [`✓ ${t("accepted")}${lock}`, "good"];

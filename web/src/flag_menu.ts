@@ -1,4 +1,4 @@
-/** After a tap on the part: which kind of feature is to be looked for there. */
+/** After a tap on the part: the kind of feature to look for there. */
 import { button, el } from "./dom";
 import { FLAGGABLE, kindText } from "./feature_facts";
 import { t } from "./language";
@@ -6,7 +6,7 @@ import type { Model } from "./model";
 import type { Operating } from "./operating";
 import type { TakeOut } from "./take_out";
 
-/** How far around is looked when nothing else is known: the parameter flag_radius_mm. */
+/** Radius of a flag without a choice: the parameter flag_radius_mm. */
 const AS_CONFIGURED = 0;
 
 export class FlagMenu {
@@ -32,7 +32,7 @@ export class FlagMenu {
     this.element.addEventListener("keydown", (event) => event.key === "Escape" && this.close());
   }
 
-  /** @param place on the part, m. @param isTouched whether that was touched. @param x, y where to open, px in the picture. */
+  /** @param place on the part, m. @param isTouched whether a touch supports it. @param x, y place of the menu, px in the picture. */
   open(place: [number, number, number], isTouched: boolean, x: number, y: number): void {
     this.place = place;
     if (isTouched) this.takeOut.look(place);

@@ -1,7 +1,7 @@
 /**
- * Where to touch next and why, and how far it is to the tolerance that was asked for.
+ * The next touch and its reason, and the distance to the wanted tolerance.
  *
- * Next is the feature whose U is widest against the tolerance; one that nothing is known of comes first.
+ * Next is the feature whose U is widest against the tolerance; one without numbers comes first.
  */
 import type { Vector3 } from "three";
 import { el, write } from "./dom";
@@ -20,7 +20,7 @@ export class Guidance {
   private readonly bar = el("progress", { id: "progress", label: "progress" });
   private readonly count = el("label", { attributes: { for: "progress" } });
   private target: NotedFeature | null = null;
-  /** Where the green arrow points, m. */
+  /** Target of the green arrow, m. */
   private arrowAt: Vector3 | null = null;
 
   constructor(
@@ -42,7 +42,7 @@ export class Guidance {
     this.show();
   }
 
-  /** The green arrow is for the feature next to the tip, which may be another one than that to be touched next. */
+  /** The green arrow is for the feature next to the tip, which may be another one than that of the next touch. */
   arrow(at: Vector3 | null): void {
     this.arrowAt = at;
     this.showHow();

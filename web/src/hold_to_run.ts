@@ -1,11 +1,11 @@
 /**
- * Hold to run: while a button is held the page sends a beat each 20 ms, and the arm moves; without beats it stands within 200 ms.
+ * Hold to run: while somebody holds a button the page sends a beat each 20 ms, and the arm moves; without beats it stands within 200 ms.
  *
- * Whatever makes it doubtful that a hand is on the button ends the beats: the finger goes up or is lost, the key goes up, the window
- * or the button loses the focus, the page is hidden, the line is lost. It then has to be pressed anew.
+ * Every doubt about a hand on the button ends the beats: the finger goes up or gets lost, the key goes up, the window or the button loses
+ * the focus, the page hides, the line breaks. It then needs a new press.
  */
 
-/** ms. The node has the arm stop after a silence of 120 ms: it goes on where four beats in a row are lost. */
+/** ms. The node stops the arm after a silence of 120 ms: it survives the loss of four beats in a row. */
 export const BEAT = 20;
 
 export interface Hold {

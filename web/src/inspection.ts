@@ -9,7 +9,7 @@ import type { TextKey } from "./texts";
 export const DECISIONS = ["fail", "undecided", "pass"] as const;
 export type Decision = (typeof DECISIONS)[number];
 
-/** Its numbers are beside these fields: `actual_mm`, `deviation_deg`, … */
+/** Its numbers stand beside these fields, as `actual_mm` and `deviation_deg`. */
 export interface Characteristic {
   number: string;
   name: string;
@@ -38,7 +38,9 @@ export function decisionWord(decision: Decision): string {
   return t(WORDS[decision]);
 }
 
-/** Failed ones first, then undecided, then passed ones; among those of a kind the less probable to conform first, and what was not measured before all. */
+/**
+ * Failed ones first, then undecided, then passed ones; within a group the less probable to conform first, and unmeasured ones before all.
+ */
 export function worstFirst(all: Characteristic[]): Characteristic[] {
   const rank = ({ decision }: Characteristic): number => DECISIONS.indexOf(decision);
   const probability = (one: Characteristic): number => one.conformance_probability ?? -1;

@@ -1,6 +1,6 @@
 /**
- * Words that stand at places of the part: the numbers of features, which can be tapped, and the distance at the tip. They are HTML, so
- * that they stay sharp, can be read aloud and reached by keyboard.
+ * Words at places of the part: the numbers of features, which react to a tap, and the distance at the tip. They are HTML, so that they stay
+ * sharp, and screen readers and keyboards reach them.
  */
 import { Vector3 } from "three";
 import { el, write } from "./dom";
@@ -8,7 +8,7 @@ import { title } from "./feature_facts";
 import { type NotedFeature, Status, triple } from "./messages";
 import type { Stage } from "./stage";
 
-/** The words at the tip stand so far beside it, as in the style sheet, px. */
+/** Distance of the words at the tip from it, as in the style sheet, px. */
 const TIP_OFFSET = 20;
 
 interface Label {

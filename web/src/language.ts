@@ -1,8 +1,9 @@
 /**
- * The language of the page: chosen by the browser's wish, switchable, remembered; and how a text of the table gets onto the page.
+ * The language of the page: first the browser's choice, then the user's, which it remembers; and the way of a text from the table onto the
+ * page.
  *
- * Elements that only show a text carry its key (`data-text`, `data-label`) and are rewritten when the language changes; what is
- * put together from numbers is drawn again by whoever listens.
+ * Elements that only show a text carry its key (`data-text`, `data-label`) and follow a change of the language; listeners draw texts with
+ * numbers again.
  */
 import { keep, settings } from "./settings";
 import { LANGUAGES, type Language, type TextKey, texts } from "./texts";
@@ -28,7 +29,7 @@ export function locale(): string {
   return { en: "en-GB", de: "de-DE", es: "es-ES" }[current];
 }
 
-/** A text of the table; `{name}` in it is replaced. */
+/** A text of the table; the value of that name replaces `{name}` in it. */
 export function t(key: TextKey, values: Record<string, string | number> = {}): string {
   const text = texts[key][LANGUAGES.indexOf(current)];
   return text.replace(/\{(\w+)\}/g, (whole, name: string) => String(values[name] ?? whole));

@@ -1,4 +1,4 @@
-/** What the colours of the part mean: the choice, and for it a legend with words or a scale in mm. */
+/** Meaning of the part's colours: the choice, and for it a legend with words or a scale in mm. */
 import { COLOUR_MODES, type ColourMode, modeNamed, scaleEnd, UNKNOWN_COLOUR } from "./colours";
 import { el } from "./dom";
 import { onLanguage, t } from "./language";
@@ -8,7 +8,7 @@ import { decimal, decimalsOf } from "./numbers";
 import { keep, settings } from "./settings";
 import type { Stage } from "./stage";
 
-/** The scale is looked at again so often while the mesh changes, ms. */
+/** Time between two looks at the scale while the mesh changes, ms. */
 const RENEW = 2000;
 
 export class Legend {
@@ -47,14 +47,14 @@ export class Legend {
     }, RENEW);
   }
 
-  /** The legend proper can be folded away, and is at first where the picture is small. */
+  /** The legend proper folds, and begins folded in a small picture. */
   private folded(): HTMLElement {
     const folded = el("details", {}, el("summary", { text: "legend" }), this.key);
     folded.open = !matchMedia("(max-width: 640px)").matches;
     return folded;
   }
 
-  /** Only what the mesh has can be chosen. */
+  /** Offers only the numbers that the mesh has. */
   private offer(): void {
     const there = COLOUR_MODES.filter((mode) => mode.isThere(this.store));
     if (this.choice.options.length === there.length) return;

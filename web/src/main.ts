@@ -1,4 +1,4 @@
-/** Where the page begins: its style, then its line to the node and its parts, or the setup where there is no node yet. */
+/** Begin of the page: its style, then its line to the node and its parts, or the setup if there is no node yet. */
 import "./theme.css";
 import "./style.css";
 import { Connection } from "./connection";
@@ -29,7 +29,7 @@ async function begin(): Promise<void> {
   connection.onState(({ kind }) => kind === "waiting" && void reloadForSetup());
 }
 
-/** A program that was started again may have no node yet. */
+/** A restarted program may have no node yet. */
 async function reloadForSetup(): Promise<void> {
   const setup = await askSetup();
   if (setup !== null && setup !== "running") location.reload();

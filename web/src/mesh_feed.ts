@@ -1,6 +1,6 @@
 /**
- * Takes the frames of the mesh off the line, in their order, into the store. A frame that is none, or does not continue what is
- * here, has the line begin anew, which brings the whole state.
+ * Takes the frames of the mesh off the line, in their order, into the store. An invalid frame, or one that does not continue the mesh,
+ * restarts the line, which brings the whole state.
  */
 import { CdrError } from "./cdr";
 import type { Connection } from "./connection";

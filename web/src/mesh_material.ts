@@ -1,6 +1,6 @@
 /**
- * How the mesh is drawn: flat faces, whose normals come from the derivatives of the place on the screen, so that no normal has to be
- * kept while the mesh moves; the colour of a vertex is chosen in the shader, so that another choice uploads nothing.
+ * Shading of the mesh: flat faces, whose normals come from the derivatives of the place on the screen, so that a moving mesh needs no
+ * normals; the shader chooses the colour of a vertex, so that another choice uploads nothing.
  */
 import { GLSL3, ShaderMaterial, DoubleSide, Vector3 } from "three";
 import { FAR } from "./mesh_store";
@@ -87,7 +87,7 @@ export class MeshMaterial extends ShaderMaterial {
   }
 }
 
-/** As it is on the screen: light is reckoned there too, so that legend and part have the same colours. */
+/** A colour in the space of the screen: the shader computes light there too, so that legend and part have the same colours. */
 function vector(hex: string): Vector3 {
   return new Vector3(...rgb(hex));
 }

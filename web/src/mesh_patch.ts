@@ -1,14 +1,14 @@
 /**
  * A change of the mesh as it comes over the wire: `touchup_msgs/msg/MeshPatch` behind one kind byte.
  *
- * Its arrays are views into the frame. What decodes here is whole and consistent in itself (lengths belong together, no number is
- * absurd); whether it fits the mesh that is there, the store decides.
+ * Its arrays are views into the frame. A decoded patch is whole and consistent in itself (lengths belong together, no number is absurd);
+ * the store decides whether it fits its mesh.
  */
 import { CdrError, CdrReader } from "./cdr";
 
 export const KIND_MESH_PATCH = 1;
 
-/** What a vertex rests on, as `MeshPatch.SUPPORT_*`. */
+/** Support of a vertex, as `MeshPatch.SUPPORT_*`. */
 export const Support = { scan: 0, touched: 1, guessed: 2, unreachable: 3 } as const;
 
 /** Numbers of vertices and faces stay below this; more would not fit into the memory of a tablet. */
@@ -25,7 +25,7 @@ export interface MeshPatch {
   vertices: Uint32Array;
   /** Three numbers for each vertex, m. */
   positions: Float32Array;
-  /** Along the normal, m²; NaN where it is not known. */
+  /** Along the normal, m²; NaN if unknown. */
   variance: Float32Array;
   support: Uint8Array;
   faces: Uint32Array;

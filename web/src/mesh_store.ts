@@ -1,15 +1,15 @@
 /**
- * The mesh as it is known here: growing typed arrays, indexed by the node's own numbers of vertices and faces.
+ * The mesh in the page: growing typed arrays, indexed by the node's own numbers of vertices and faces.
  *
- * It takes up patches as `msg/MeshPatch.msg` says: a whole state (from version 0) or a change of the version that is here. While a
- * whole state comes in its parts, what was there before stays and is drawn; what the whole state did not name goes with its
- * last part. So after a lost connection the picture does not flicker.
+ * It takes up patches as `msg/MeshPatch.msg` says: a whole state (from version 0) or a change of the present version. While a whole state
+ * comes in its parts, the mesh before it stays visible; everything that the whole state did not name goes with its last part. So after a
+ * lost connection the picture does not flicker.
  */
 import { DirtyRanges } from "./dirty_ranges";
 import type { MeshPatch } from "./mesh_patch";
 import { WHICH, type VertexNumbers } from "./vertex_numbers";
 
-/** The patch does not belong to what is here: the whole state has to come again. */
+/** The patch does not continue the mesh: the whole state has to come again. */
 export class GapError extends Error {}
 
 /** Bytes of `quality` for each vertex. */
@@ -18,7 +18,7 @@ export const QUALITY = { support: 0, outlier: 1, alive: 3 } as const;
 /** Deviation, m, of a vertex that the nominal part is far from: no part is so large. */
 export const FAR = 1e3;
 
-/** Room beyond what was asked for, so that not every new vertex makes the arrays grow. */
+/** Room beyond the request, so that not every new vertex makes the arrays grow. */
 const SPARE = 1.25;
 
 export class MeshStore {
@@ -28,18 +28,18 @@ export class MeshStore {
   faceCount = 0;
   /** x y z of each vertex, m. */
   positions = new Float32Array(0);
-  /** Along the normal, m²; -1 where it is not known, as a GPU may not tell NaN. */
+  /** Along the normal, m²; -1 if unknown, since a GPU may not detect NaN. */
   variance = new Float32Array(0);
   /** Four bytes for each vertex: see `QUALITY`. */
   quality = new Uint8Array(0);
-  /** Three vertices for each face; thrice the same where there is none. */
+  /** Three vertices for each face; thrice the same for an absent one. */
   corners = new Uint32Array(0);
   /** One more than the largest number of a face ever given. */
   faceEnd = 0;
-  /** Deviation from the nominal part, m, by vertex; null while nobody measured it. */
+  /** Deviation from the nominal part, m, by vertex; null before the first measurement. */
   deviation: Float32Array | null = null;
   hasOutliers = false;
-  /** Grows when the arrays were replaced by larger ones. */
+  /** Grows with each replacement of the arrays by larger ones. */
   generation = 0;
   dirtyVertices = new DirtyRanges(0);
   dirtyFaces = new DirtyRanges(0);
@@ -47,18 +47,18 @@ export class MeshStore {
   readonly low = [Infinity, Infinity, Infinity];
   readonly high = [-Infinity, -Infinity, -Infinity];
 
-  /** What the parts of the whole state named so far; null between whole states. */
+  /** Vertices and faces in the parts of the whole state up to now; null between whole states. */
   private whole: { vertices: Uint8Array; faces: Uint8Array } | null = null;
   private nextPart = 0;
   /** How much of the whole state that is coming has come, 0 to 1. */
   progress = 0;
 
-  /** Whether the mesh is that of a version now: not between the parts of a change, where a face may lack a vertex. */
+  /** Whether the mesh is that of a version: not between the parts of a change, with faces that may lack a vertex. */
   get isWhole(): boolean {
     return this.version > 0 && this.nextPart === 0;
   }
 
-  /** @throws GapError when it does not continue what is here, or its counts do not come out. */
+  /** @throws GapError if it does not continue the mesh, or its counts are wrong. */
   apply(patch: MeshPatch): void {
     if (!this.begins(patch)) return;
     this.reserve(patch);
@@ -79,7 +79,7 @@ export class MeshStore {
     }
   }
 
-  /** Whether the patch is to be taken up; false for one that brings nothing new. */
+  /** Whether the patch brings news. */
   private begins(patch: MeshPatch): boolean {
     const isWhole = patch.baseVersion === 0;
     if (patch.part !== (isWhole && patch.part === 0 ? 0 : this.nextPart)) throw new GapError(`part ${patch.part} is out of order`);
@@ -136,7 +136,7 @@ export class MeshStore {
     this.high.fill(-Infinity);
   }
 
-  /** After the last part of a whole state: what it did not name goes. */
+  /** Removes everything that a whole state did not name, after its last part. */
   private sweep(): void {
     const whole = this.whole;
     if (whole === null) return;

@@ -1,6 +1,4 @@
-/**
- * The mesh on the GPU: the store's own arrays as buffers, of which only the stretches that changed are uploaded.
- */
+/** The mesh on the GPU: the store's own arrays as buffers, with uploads of changed stretches alone. */
 import { BufferAttribute, BufferGeometry, DynamicDrawUsage, Mesh, Sphere, Vector3 } from "three";
 import type { ColourMode } from "./colours";
 import type { DirtyRanges } from "./dirty_ranges";
@@ -26,7 +24,7 @@ export class MeshView {
     this.material.colourBy(mode, scaleEnd);
   }
 
-  /** Before each frame: takes over what the store says has changed. */
+  /** Before each frame: takes over the store's changes. */
   update(): void {
     const { store } = this;
     // until all parts of a change are here the last version stays in the picture

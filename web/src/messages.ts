@@ -1,6 +1,6 @@
 /**
- * What comes over the wire as JSON, as far as the page reads it. Names and units are those of `msg/` and docs/ros.md: m, rad, N, s.
- * What is not known is null (NaN has no place in JSON).
+ * JSON messages, as far as the page reads them. Names and units are those of `msg/` and docs/ros.md: m, rad, N, s. An unknown number is
+ * null (NaN has no place in JSON).
  */
 
 export type Num = number | null;
@@ -19,7 +19,7 @@ export interface State {
   is_paused: boolean;
   /** `is_size_confirmed`: an operator has just said on the page how large it is. */
   scan: { file: string; faces: number; is_size_confirmed: boolean };
-  /** Its file, where the node has one. */
+  /** Its file, if the node has one. */
   nominal_part: string | null;
   arm: null | { may_move: boolean; motion: "rests" | "moves" | "retracts"; stays_because?: string | null };
   clients: number;
@@ -67,14 +67,14 @@ export interface Feature extends Stated<"diameter" | "length" | "width" | "depth
   form: FormDeviation[];
 }
 
-/** What operators said of a feature; `locked`: as it was when somebody locked it, which is what counts from then on. */
+/** Operators' notes on a feature; `locked`: its state at the lock, which counts from then on. */
 export interface Annotation {
   name: string;
   mark: Mark;
   locked: Feature | null;
 }
 
-/** A feature as it is shown: with what was said of it. */
+/** A feature as the page shows it: with its notes. */
 export interface NotedFeature extends Feature {
   name: string;
   mark: Mark;
@@ -130,7 +130,7 @@ export interface ProbeResult {
   duration: Num;
 }
 
-/** Codes of `ProbeResult` from which on the arm stands until somebody has looked. */
+/** Codes of `ProbeResult` from which on the arm stands until an acknowledgement. */
 export const STOPPED_FROM = 40;
 export const PLANNED = 4;
 
@@ -151,20 +151,20 @@ export interface Session {
   is_current: boolean;
   bytes: number;
   files: string[];
-  /** RFC 3339; absent where nobody wrote it down. */
+  /** RFC 3339; absent without a record of it. */
   begun?: string;
 }
 
 /** Topic `replay`: how far the replay of a session is. Times are those along the recording without its long pauses, s. */
 export interface ReplayState {
   session: string;
-  /** Before that it is being read. */
+  /** False during the reading of the session. */
   is_ready: boolean;
   speed: number;
   is_paused: boolean;
   at_s: number;
   end_s: number;
-  /** Where it runs ahead to; null: it plays. */
+  /** Target of its fast forward; null: it plays. */
   target_s: number | null;
   is_at_end: boolean;
   damage: string | null;
@@ -194,7 +194,7 @@ export interface Answer {
   message: string;
 }
 
-/** As three numbers, or null where one of them is not known. */
+/** As three numbers, or null with an unknown one. */
 export function triple(at: Xyz | undefined): [number, number, number] | null {
   if (at === undefined || at.x === null || at.y === null || at.z === null) return null;
   return [at.x, at.y, at.z];

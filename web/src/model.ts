@@ -1,14 +1,11 @@
-/**
- * What the page knows: the newest message of each topic, and what the operator has chosen. Whoever shows some of it is told when it
- * changes.
- */
+/** State of the page: the newest message of each topic, and the operator's choices. Displays listen to their changes. */
 import type { Connection, LineState } from "./connection";
 import type { Annotation, DiagnosticStatus, Feature, NotedFeature, ProbeResult, ProbeTouch, Relation, State } from "./messages";
 
-/** What changed. */
+/** Parts that change. */
 export type Part = "state" | "line" | "features" | "diagnostics" | "selected" | "touches" | "result";
 
-/** Touches of one feature that are remembered. */
+/** Largest number of remembered touches of one feature. */
 const MOST_TOUCHES = 200;
 
 export class Model {
@@ -18,7 +15,7 @@ export class Model {
   /** Name of the frame that all places are in, which calls have to name too. */
   frame = "object";
   relations: Relation[] = [];
-  /** The first status: whether what comes is used. */
+  /** The first status: whether the node uses its inputs. */
   input: DiagnosticStatus | null = null;
   /** By the number of the feature. */
   readonly touches = new Map<number, ProbeTouch[]>();
@@ -28,7 +25,7 @@ export class Model {
   private annotations: Record<string, Annotation> = {};
   private readonly listeners: Array<[Part[], () => void]> = [];
 
-  /** @param replayed name of the session that is replayed here; null: the page shows the one that runs. */
+  /** @param replayed name of the replayed session; null: the page shows the running one. */
   constructor(
     connection: Connection,
     readonly replayed: string | null = null,
@@ -70,12 +67,12 @@ export class Model {
     return this.line.kind === "connected";
   }
 
-  /** Whether calls may be made here now. */
+  /** Whether this page may make calls now. */
   get mayOperate(): boolean {
     return this.isConnected && this.state?.role === "operate";
   }
 
-  /** Puts what was measured and what was said of it together; of a locked feature the numbers stay as they were. */
+  /** Combines measurements with notes; the numbers of a locked feature stay as they were. */
   private note(): void {
     this.features = this.measured.map((feature) => {
       const { name = "", mark = "none", locked = null } = this.annotations[feature.id] ?? {};

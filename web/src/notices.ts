@@ -1,7 +1,4 @@
-/**
- * Short notices at the edge of the picture: what was done, and what went wrong with the node's own sentence. Read aloud by a
- * screen reader.
- */
+/** Short notices at the edge of the picture: successes, and failures with the node's own sentence. A screen reader reads them aloud. */
 import { CallError } from "./connection";
 import { button, el } from "./dom";
 import { t } from "./language";
@@ -9,7 +6,7 @@ import type { TextKey } from "./texts";
 
 /** How long a notice stays, ms; one about an error stays longer, one with something to do longest. */
 const STAYS = { good: 4000, bad: 12_000, offer: 60_000 };
-/** More at once nobody reads. */
+/** Largest number at once. */
 const MOST = 3;
 
 export class Notices {
@@ -19,7 +16,7 @@ export class Notices {
     this.tell(words, "good");
   }
 
-  /** With a button for what can be done about it, once. */
+  /** With a button for its remedy, once. */
   offer(words: string, name: TextKey, action: () => void): void {
     const notice = this.tell(words, "good", STAYS.offer);
     const act = button("undo", name, () => {

@@ -1,19 +1,19 @@
 /**
- * Numbers as an operator reads them: mm and degrees, the decimal sign of the language, and as many digits as are worth something.
+ * Numbers as an operator reads them: mm and degrees, the decimal sign of the language, and only significant digits.
  *
- * U is the expanded uncertainty with k = 2. It has two digits that count and is rounded up, so that it is never said smaller than
- * it is; the value gets the decimals of its U [JCGM 100, 7.2.6].
+ * U is the expanded uncertainty with k = 2. It has two significant digits, rounded up, so that it never looks smaller than it is; the value
+ * gets the decimals of its U [JCGM 100, 7.2.6].
  */
 import { locale } from "./language";
 import type { Num } from "./messages";
 
 /** Of the expanded uncertainty U = k · u: about 95 %. */
 export const COVERAGE_FACTOR = 2;
-/** Decimals of a length in mm at most: 0.1 µm, below which nothing here is known. */
+/** Decimals of a length in mm at most: 0.1 µm, the limit of all knowledge here. */
 const MOST_DECIMALS = 4;
 /** Decimals of a length in mm whose uncertainty is not known. */
 const PLAIN_DECIMALS = 2;
-/** What binary fractions may put onto a decimal, relative. */
+/** Largest error of a decimal in binary fractions, relative. */
 const ROUNDING = 1e-9;
 
 /** By language and decimals: making one takes longer than a hundred numbers. */
@@ -47,7 +47,7 @@ export function expanded(std: Num): number | null {
   return std === null || !Number.isFinite(std) ? null : COVERAGE_FACTOR * std;
 }
 
-/** "8.021 ± 0.025 mm", "≥ 8.0 mm", "8.02 mm"; null where there is no value. From m. */
+/** "8.021 ± 0.025 mm", "≥ 8.0 mm", "8.02 mm"; null without a value. From m. */
 export function length(value: Num, std: Num, isAtLeast = false): string | null {
   return withU(value, std, 1e3, "mm", isAtLeast);
 }
@@ -102,7 +102,7 @@ export function bytes(count: number): string {
   return `${decimal(count / 1e3 ** step, step === 0 ? 0 : 1)}\u00a0${["B", "kB", "MB", "GB"][step]}`;
 }
 
-/** A number in mm as somebody typed it, with comma or point; null where it is none. */
+/** A typed number in mm, with comma or point; null for other text. */
 export function typedMillimetres(text: string): number | null {
   const number = Number(text.trim().replace(",", "."));
   return text.trim() !== "" && Number.isFinite(number) && number > 0 ? number / 1e3 : null;

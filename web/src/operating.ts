@@ -41,7 +41,7 @@ export class Operating {
     return null;
   }
 
-  /** Why nothing can be operated here; null when it can. */
+  /** Reason against operating here; null without one. */
   reason(): string | null {
     if (!this.model.isConnected) return t("whyNoLine");
     if (this.model.replayed !== null) return t("whyReplay");

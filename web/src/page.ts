@@ -1,4 +1,4 @@
-/** Puts the page together: who shows what, and who is told of what. */
+/** Puts the page together: its displays and their listeners. */
 import { ArmPanel } from "./arm_panel";
 import type { Connection } from "./connection";
 import { Controls } from "./controls";
@@ -31,12 +31,12 @@ import { isTouched } from "./touch_choice";
 import { ForceBar, ViewBar } from "./view_bar";
 import { Vector3 } from "three";
 
-/** Between frames while the arm's button is held, ms. */
+/** Time between frames while somebody holds the arm's button, ms. */
 const CALM = 200;
-/** Farther from a feature than this nobody who holds the tip asks for it, m. */
+/** Largest distance from a feature at which an operator with the tip asks for it, m. */
 const NEAR = 0.05;
 
-/** @param replayed name of the session that is replayed; null: the page shows the one that runs. */
+/** @param replayed name of the replayed session; null: the page shows the running one. */
 export function buildPage(connection: Connection, replayed: string | null): void {
   const store = new MeshStore();
   const model = new Model(connection, replayed);
@@ -99,7 +99,7 @@ export function buildPage(connection: Connection, replayed: string | null): void
     if (replayed !== null) layOutReplay(replayed);
   }
 
-  /** What acts on a session that runs goes, and what acts on the replay takes its place. */
+  /** Replaces the controls of a running session by those of the replay. */
   function layOutReplay(session: string): void {
     const onReading = (): void => write(loading, t("replayReading"));
     const replay = new Replay(connection, session, notices, onReading, () => (loading.hidden = true));

@@ -1,8 +1,7 @@
 /**
- * Which face a ray meets first.
+ * The first face on a ray.
  *
- * By going through all of them: some 10 ms for a million faces, for one tap now and then; a tree would have to be kept up to date
- * with every touch.
+ * By going through all of them: some 10 ms for a million faces, for one tap now and then; a tree would need an update with every touch.
  */
 import type { MeshStore } from "./mesh_store";
 
@@ -16,7 +15,7 @@ export interface Hit {
 
 type Triple = readonly [number, number, number];
 
-/** A ray so parallel to a face that no place can be told, relative. */
+/** A ray so parallel to a face that their crossing has no place, relative. */
 const PARALLEL = 1e-14;
 
 /** After Möller and Trumbore; faces count from both sides. */

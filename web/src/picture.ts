@@ -1,6 +1,4 @@
-/**
- * The three-dimensional picture: the part, its features, the tip, the path; and what a tap on it means.
- */
+/** The three-dimensional picture: the part, its features, the tip, the path; and the effect of a tap on it. */
 import { Color, Group, Mesh, MeshBasicMaterial, SphereGeometry, Vector2, Vector3 } from "three";
 import { CameraMan } from "./camera_man";
 import { el } from "./dom";
@@ -80,13 +78,13 @@ export class Picture {
     this.stage.ask();
   }
 
-  /** The touch that may be taken out, by contacts of it; none takes it away. */
+  /** The removable touch, by contacts of it; none hides it. */
   showTouch(contacts: Xyz[]): void {
     drawTouch(this.touch, contacts);
     this.stage.ask();
   }
 
-  /** A dot where somebody tapped; null takes it away. */
+  /** A dot at a tapped place; null hides it. */
   showMark(place: [number, number, number] | null): void {
     this.mark.visible = place !== null;
     if (place !== null) {
@@ -96,7 +94,7 @@ export class Picture {
     this.stage.ask();
   }
 
-  /** What lies under a place of the picture, px from its upper left. */
+  /** The part under a place of the picture, px from its upper left. */
   pickAt(x: number, y: number): Hit | null {
     const { camera, size } = this.stage;
     const at = new Vector2((2 * x) / size.width - 1, 1 - (2 * y) / size.height);

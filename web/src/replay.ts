@@ -1,6 +1,6 @@
 /**
- * The replay of a session: a banner that says that it is one, and its controls. It is set by `~/replay`, and all pages of the session see
- * the same place of it.
+ * The replay of a session: a banner that marks it, and its controls. `~/replay` sets it, and all pages of the session see the same place of
+ * it.
  */
 import type { Connection } from "./connection";
 import { button, el, picture, say, write } from "./dom";
@@ -11,13 +11,13 @@ import { percent } from "./numbers";
 import { clockTime } from "./replay_place";
 
 const SPEEDS = [1, 4, 16];
-/** The slider has places of so many s. */
+/** Step of the slider, s. */
 const STEP = 0.1;
 
 export class Replay {
   /** Over everything, for as long as the page is there. */
   readonly banner: HTMLElement;
-  /** In the place of the bar of what is done in a session. */
+  /** In place of the bar of a session's actions. */
   readonly controls: HTMLElement;
   private state: ReplayState | null = null;
   private readonly title = el("strong");
@@ -31,7 +31,7 @@ export class Replay {
   private readonly aheadWords = el("span");
   private isDragged = false;
 
-  /** @param onReading it is read, and nothing is seen yet. @param onRefused there is none. */
+  /** @param onReading the node reads it, and nothing is visible yet. @param onRefused there is none. */
   constructor(
     private readonly connection: Connection,
     private readonly session: string,

@@ -1,4 +1,4 @@
-/** Where the replay of a session is: the address of its page, that of its socket, and times along it. */
+/** Place of a session's replay: the address of its page, that of its socket, and times along it. */
 
 /** Path of the page that replays a session. */
 export function replayAddress(session: string): string {

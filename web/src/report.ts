@@ -1,4 +1,4 @@
-/** The inspection report of a session: asks for what `touchup inspect` has flags for, has the node make it, and shows what came of it. */
+/** The inspection report of a session: asks for the values of `touchup inspect`'s flags, has the node make it, and shows the result. */
 import { button, el, write } from "./dom";
 import type { Inspection } from "./inspection";
 import { t } from "./language";
@@ -21,7 +21,7 @@ export class Report {
   private readonly form: HTMLElement;
   private session: Session | null = null;
   private isMaking = false;
-  /** How often results were asked for. */
+  /** Number of requests for results. */
   private readings = 0;
 
   constructor(
@@ -85,7 +85,7 @@ export class Report {
     }
   }
 
-  /** What is missing, before anything is sent. */
+  /** The missing field, before any request. */
   private whyNot({ nominal, file }: ReportForm): string | null {
     if (nominal !== "upload") return null;
     if (file === null) return t("reportNoFile");

@@ -1,4 +1,4 @@
-/** The fields of a report: nominal values, general tolerance, rule, and what stands in its head. */
+/** The fields of a report: nominal values, general tolerance, rule, and the entries of its head. */
 import { el } from "./dom";
 import { onLanguage, t } from "./language";
 import type { Session } from "./messages";
@@ -10,7 +10,7 @@ const UNITS = ["mm", "m", "inch"];
 const CLASSES: Array<[string, TextKey]> = [
   ["", "generalNone"], ["iso2768-f", "generalFine"], ["iso2768-m", "generalMedium"], ["iso2768-c", "generalCoarse"], ["iso2768-v", "generalVeryCoarse"],
 ];
-/** Of a CAD mesh, until somebody chooses another one. */
+/** Of a CAD mesh, until another choice. */
 const FOR_MESHES = "iso2768-m";
 /** Of the drawing to the part. */
 const ALIGNMENTS: Array<[string, TextKey]> = [["", "alignNone"], ["best-fit", "alignBestFit"]];
@@ -32,7 +32,7 @@ export class ReportFields {
   private readonly operator = text("report-operator");
   private readonly fileField = field("reportFile", this.file);
   private readonly unitField = field("reportUnit", this.unit);
-  /** The general tolerance is that for meshes, and nobody's wish. */
+  /** The general tolerance is the default for meshes, and no user's choice. */
   private isChosenHere = false;
   private offered: Array<[NominalFrom, string | null]> = [];
 
@@ -93,7 +93,7 @@ export class ReportFields {
     });
   }
 
-  /** A CAD mesh has no tolerances of its own: a general one is chosen, and can be another, but not none. */
+  /** A CAD mesh has no tolerances of its own: it gets a general one, which the user may replace, but not remove. */
   private fit(): void {
     const { nominal, file } = this.read();
     const isUpload = nominal === "upload";

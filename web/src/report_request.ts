@@ -1,21 +1,21 @@
-/** What the page asks of a report, as the address has it (docs/page.md). */
+/** The page's request of a report, in the form of the address (docs/page.md). */
 
-/** Bytes of a file that can be handed in; a table may have less. */
+/** Largest size of an uploaded file, bytes; a table may have less. */
 export const LARGEST = 64 * 2 ** 20;
-/** What the node names its own nominal part, and those of the session, by. */
+/** Names of the node for its own nominal part, and for those of the session. */
 export type NominalFrom = "upload" | "part" | "nominal.csv" | "nominal.json";
 
 export interface ReportForm {
   nominal: NominalFrom;
   file: File | null;
-  /** Of a mesh that is handed in. */
+  /** Of an uploaded mesh. */
   unit: string;
-  /** "" where the drawing is in the frame of the scan. */
+  /** "" for a drawing in the frame of the scan. */
   align: string;
-  /** "" where the drawing alone counts. */
+  /** "" for the drawing alone. */
   general: string;
   rule: string;
-  /** In percent, as it was typed. */
+  /** In percent, as typed. */
   confidence: string;
   part: string;
   serial: string;
@@ -27,7 +27,7 @@ export function isMesh(name: string): boolean {
   return /\.(ply|stl|obj)$/i.test(name);
 }
 
-/** The query; what is empty is left out, so that the default of the program counts. */
+/** The query; without empty fields, so that the default of the program counts. */
 export function asked(form: ReportForm): string {
   const { nominal, file } = form;
   const isUpload = nominal === "upload";

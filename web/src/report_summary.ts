@@ -1,4 +1,4 @@
-/** What came of an inspection: the verdict, each decision with sign and word, the worst first, and the files of the report. */
+/** Result of an inspection: the verdict, each decision with sign and word, the worst first, and the files of the report. */
 import { el } from "./dom";
 import { type Characteristic, countWords, decisionWord, type Inspection, LEVELS, valueWords, worstFirst } from "./inspection";
 import { locale, t } from "./language";

@@ -1,4 +1,4 @@
-/** The sessions that are kept beside the node, with their files to take away. */
+/** The sessions that the node keeps, with their files to take away. */
 import { button, el, picture } from "./dom";
 import { locale, t } from "./language";
 import type { Session } from "./messages";
@@ -49,7 +49,7 @@ export class Sessions {
     if (found.length === 0) this.list.replaceChildren(el("p", { text: "noSessions" }));
   }
 
-  /** All of them; null where they could not be read, which is said. */
+  /** All of them; null after a failure, with a message. */
   private async read(): Promise<Session[] | null> {
     try {
       const answer = await fetch("/api/sessions");

@@ -1,6 +1,4 @@
-/**
- * What the page remembers on this device: language, theme, colours, tolerance. Where the browser forbids it, it forgets.
- */
+/** Settings that the page remembers on this device: language, theme, colours, tolerance. If the browser forbids it, it forgets. */
 
 const KEY = "touchup";
 
@@ -11,7 +9,7 @@ export interface Settings {
   /** Wanted expanded uncertainty, m. */
   tolerance: number;
   showsAll: boolean;
-  /** Scan whose size and place somebody has looked at here. */
+  /** Scan with a check of size and place on this device. */
   checkedScan: string;
   /** Who made the last report here. */
   operator: string;
@@ -30,7 +28,7 @@ export function keep(changed: Partial<Settings>): void {
   }
 }
 
-/** What was kept, each thing only where it has the type of its default. */
+/** The stored settings, each only if it has the type of its default. */
 function read(): Settings {
   let kept: unknown = null;
   try {

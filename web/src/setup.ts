@@ -1,6 +1,6 @@
 /**
- * Before the first touch, for people who never saw the page: is the part as large as it is, does anything come from the sensors, does
- * the tip feel nothing in the air, and does the ball lie where the tip touches. Four steps, one at a time, each with what to do if not.
+ * Before the first touch, for people who never saw the page: is the part as large as it is, does anything come from the sensors, does the
+ * tip feel nothing in the air, and does the ball lie at the touched place. Four steps, one at a time, each with its remedy.
  */
 import { button, el, say, write } from "./dom";
 import { onLanguage, t } from "./language";
@@ -50,7 +50,7 @@ export class Setup {
     onLanguage(() => this.isOpen && this.show());
   }
 
-  /** Opens by itself for a scan that nobody has looked at on this device. */
+  /** Opens by itself for a scan without a check on this device. */
   meshCame(): void {
     if (!this.isOpen && this.scan !== null && settings.checkedScan !== this.scan && this.model.mayOperate) this.open(this.unasked);
   }
@@ -77,7 +77,7 @@ export class Setup {
     return this.steps[this.at];
   }
 
-  /** What nobody has asked yet: before there was a node, the size was. */
+  /** The open questions: before there was a node, the setup asked for the size. */
   private get unasked(): readonly Step[] {
     const isSizeSaid = this.model.state?.scan.is_size_confirmed === true;
     return STEPS.filter((step) => step !== "size" || !isSizeSaid);

@@ -1,6 +1,6 @@
 /**
- * One calibration in the setup: whether the scene has it and since when, what to do with the hand, the recording that was made of that,
- * what was found in it, and the button that puts it into the scene.
+ * One calibration in the setup: whether the scene has it and since when, instructions for the hand, the recording of it, its result, and
+ * the button that puts it into the scene.
  */
 import { found, numbersOf } from "./calibration_numbers";
 import { button, el, write } from "./dom";
@@ -16,7 +16,7 @@ const CALIBRATIONS: Record<CalibrationName, { title: TextKey; cost: TextKey; how
   scan: { title: "calibrationScan", cost: "calibrationScanCost", how: "calibrationScanHow", command: "touchup calibrate scan" },
 };
 
-/** What a device offers to choose from: recordings, and where points are needed tables. */
+/** Files that a device offers: recordings, and tables if the calibration needs points. */
 const RECORDINGS = ".mcap,.db3";
 const TABLES = ".csv";
 const DAY_MS = 86_400_000;
@@ -37,9 +37,9 @@ export class CalibrationCard {
   private readonly send: HTMLButtonElement;
   private readonly alone: HTMLButtonElement;
   private readonly use: HTMLButtonElement;
-  /** The table of points that was chosen here. */
+  /** The table of points chosen here. */
   private points: string | null = null;
-  /** Share of what this device sends that has gone; null: nothing. */
+  /** Sent share of this device's upload; null: none. */
   private sent: { file: string; share: number } | null = null;
   private drawn = { lists: "", result: "", state: "" };
   private state: SetupState | null = null;
@@ -177,7 +177,7 @@ export class CalibrationCard {
     void this.desk.attempt(this.step, () => changeSetup("calibrate", request));
   }
 
-  /** Sends a recording, which is calibrated by then, or a table, which is chosen then. */
+  /** Sends a recording, which the node then calibrates, or a table, which becomes the choice. */
   private async upload(): Promise<void> {
     const file = this.input.files?.[0];
     // lets the user send the same file again
@@ -201,7 +201,7 @@ export class CalibrationCard {
   }
 }
 
-/** What a calibration is at, where it is the one of a card. */
+/** State of the calibration of a card. */
 type OwnChoice = Exclude<CalibrationChoice, { state: "none" }> | null;
 
 function entry({ name, bytes: length, modified_s }: SetupFile, onClick: () => void): HTMLElement {

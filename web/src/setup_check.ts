@@ -1,4 +1,4 @@
-/** The fourth step: the calibrations of the scene, and what a recording of touches says of scan, tip and sensors. */
+/** The fourth step: the calibrations of the scene, and the findings of a recording of touches on scan, tip and sensors. */
 import { button, el, say, write } from "./dom";
 import { t } from "./language";
 import { CalibrationCard } from "./setup_calibration";
@@ -6,7 +6,7 @@ import { type CheckFinding, changeSetup, type SetupFile, type SetupState } from 
 import { refusalWords, type SetupDesk, SetupStep } from "./setup_step";
 import type { TextKey } from "./texts";
 
-/** In the order in which they are made. */
+/** In the order of their making. */
 const CALIBRATIONS = ["tip", "payload", "scan"] as const;
 
 export class CheckStep extends SetupStep {

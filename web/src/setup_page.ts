@@ -1,6 +1,6 @@
 /**
- * The page before there is a node: steps from a scan to the start, one at a time, as buttons that approve. The program keeps what was
- * chosen, so that every page shows the same; a page that may only look sees it too.
+ * The page before there is a node: steps from a scan to the start, one at a time, as buttons that approve. The program keeps the choices,
+ * so that every page shows the same; a page that may only look sees it too.
  */
 import "./setup.css";
 import { CallError } from "./connection";

@@ -5,7 +5,7 @@ import { bytes, percent } from "./numbers";
 import { changeSetup, sendScan, type SetupFile, type SetupState } from "./setup_state";
 import { refusalWords, type SetupDesk, SetupStep } from "./setup_step";
 
-/** What a device offers to choose from. */
+/** Files that a device offers. */
 const ACCEPTED = ".ply,.stl,.obj,.pcd,.xyz,.txt,.asc,.e57";
 
 export class ScanStep extends SetupStep {
@@ -17,7 +17,7 @@ export class ScanStep extends SetupStep {
   private readonly input = el("input", { label: "scanSend", attributes: { type: "file", accept: ACCEPTED, hidden: "" } });
   private readonly send: HTMLButtonElement;
   private shown = "";
-  /** Share of what this device sends that has gone; null: nothing. */
+  /** Sent share of this device's upload; null: none. */
   private sent: { file: string; share: number } | null = null;
   private state: SetupState | null = null;
 

@@ -1,10 +1,12 @@
-/** The setup of a node, as the program has it: what was chosen so far, by whoever operates. Asked for and changed over plain HTTP. */
+/**
+ * The setup of a node, as the program has it: the choices of any operator up to now. The page asks for it and changes it over plain HTTP.
+ */
 import { CallError } from "./connection";
 
 export interface SetupFile {
   name: string;
   bytes: number;
-  /** s since 1970, null where the system does not say. */
+  /** s since 1970, null if the system does not say. */
   modified_s: number | null;
 }
 
@@ -53,7 +55,7 @@ export type CheckChoice =
 
 export type CalibrationName = "tip" | "payload" | "scan";
 
-/** A calibration of the scene, and the day of UTC on which it was put there where the scene says it. */
+/** A calibration of the scene, and the day of UTC of its entry if the scene says it. */
 export interface NamedCalibration {
   is_there: boolean;
   date: string | null;
@@ -67,7 +69,7 @@ export interface VectorEstimate {
   std: Triple;
 }
 
-/** What is found, as `touchup calibrate … --json` prints it. */
+/** The result, as `touchup calibrate … --json` prints it. */
 export interface TipFound {
   poses: number;
   left_out: number;
@@ -97,7 +99,7 @@ export interface ScanFound {
   turn_std_deg: Triple;
 }
 
-/** A calibration that is made or was made; doubts and losses in the program's own sentences. */
+/** A running or ended calibration; doubts and losses in the program's own sentences. */
 export type CalibrationChoice =
   | { state: "none" }
   | { state: "running"; what: CalibrationName; file: string; share: number | null }
@@ -133,7 +135,7 @@ export interface SetupState {
 
 const ADDRESS = "/api/setup";
 
-/** The setup; "running" where there is a node, null where nobody answers or this page was not let in. */
+/** The setup; "running" if there is a node, null without an answer or permission. */
 export async function askSetup(): Promise<SetupState | "running" | null> {
   try {
     const answer = await fetch(ADDRESS, { cache: "no-store" });
@@ -156,7 +158,7 @@ export async function changeSetup(what: SetupStepName | "calibrate" | "use" | "l
   return answered<SetupState>(answer.ok, await answer.text());
 }
 
-/** Sends a scan, which is chosen then; `onProgress` gets the share that has gone. */
+/** Sends a scan, which becomes the choice; `onProgress` gets the sent share. */
 export function sendScan(file: File, onProgress: (share: number) => void): Promise<SetupState> {
   return send("upload", file, onProgress);
 }

@@ -1,16 +1,16 @@
-/** One step of the setup: a card with its number and title, open while it is its turn, one line when it is done. */
+/** One step of the setup: a card with its number and title, open during its turn, one line afterwards. */
 import { button, el, write } from "./dom";
 import { t } from "./language";
 import type { SetupState, SetupStepName } from "./setup_state";
 import type { TextKey } from "./texts";
 
-/** What the steps ask of the page around them. */
+/** Requests of the steps to the page around them. */
 export interface SetupDesk {
   /** Whether this page may change something now. */
   readonly mayChange: boolean;
-  /** Has something done; its failure is shown at the step. */
+  /** Does the work; the step shows its failure. */
   attempt(step: SetupStep, work: () => Promise<SetupState>): Promise<void>;
-  /** Opens a step that is done, to be done anew. */
+  /** Opens a finished step again. */
   reopen(step: SetupStepName): void;
 }
 
@@ -41,9 +41,9 @@ export abstract class SetupStep {
     );
   }
 
-  /** Whether nothing is to be done here any more. */
+  /** Whether the step is finished. */
   abstract isDone(state: SetupState): boolean;
-  /** What was chosen, in one line. */
+  /** The choice, in one line. */
   protected abstract words(state: SetupState): string;
   protected abstract draw(state: SetupState): void;
 
@@ -64,7 +64,7 @@ export abstract class SetupStep {
     if (isCurrent) this.draw(state);
   }
 
-  /** Says what went wrong; empty: nothing. */
+  /** Shows a failure; empty: none. */
   say(words: string): void {
     this.fault.hidden = words === "";
     write(this.fault, words);
@@ -77,7 +77,7 @@ export abstract class SetupStep {
   }
 }
 
-/** That a file cannot be used, and why; reasons of the program may name the file themselves. */
+/** Refusal of a file with its reason; reasons of the program may name the file themselves. */
 export function refusalWords(file: string, why: string): string {
   const named = `${file}: `;
   return t("scanRefused", { file, reason: why.startsWith(named) ? why.slice(named.length) : why });

@@ -1,4 +1,4 @@
-/** The third step: the ball that is mounted. Its radius goes into every measured size, so nobody but the operator can say it. */
+/** The third step: the mounted ball. Its radius goes into every measured size, so only the operator can give it. */
 import { button, el, write } from "./dom";
 import { t } from "./language";
 import { decimal, typedMillimetres } from "./numbers";
@@ -14,7 +14,7 @@ export class TipStep extends SetupStep {
   private readonly reading = el("p", { class: "reading", attributes: { role: "status" } });
   private readonly known = el("p", { class: "muted", text: "tipKnown" });
   private readonly use: HTMLButtonElement;
-  /** Whether the fields show what is known already. */
+  /** Whether the fields show the known values. */
   private isFilled = false;
 
   constructor(desk: SetupDesk) {
@@ -82,7 +82,7 @@ export class TipStep extends SetupStep {
   }
 }
 
-/** Without what binary fractions put onto a decimal. */
+/** A decimal without the error of binary fractions. */
 function tidy(mm: number): number {
   return Number(mm.toPrecision(12));
 }

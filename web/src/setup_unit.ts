@@ -1,4 +1,4 @@
-/** The second step: how large the part is says in which unit its scan is. One is likely; none is taken unasked. */
+/** The second step: the size of the part gives the unit of its scan. One is likely; the user confirms it. */
 import { el, write } from "./dom";
 import { t } from "./language";
 import { decimal } from "./numbers";
@@ -61,7 +61,7 @@ export class UnitStep extends SetupStep {
   }
 }
 
-/** The size in the unit that was chosen. */
+/** The size in the chosen unit. */
 export function chosenSize({ scan, unit }: SetupState): UnitChoice | null {
   if (scan.state !== "read") return null;
   return scan.units.find((choice) => choice.unit === unit) ?? null;
@@ -73,7 +73,7 @@ export function sizeWords({ sides_m }: UnitChoice): string {
   return sides.map((side) => decimal(side * 1e3, side < 0.01 ? 1 : 0)).join(" × ");
 }
 
-/** What is to be known of the scan. */
+/** Facts of the scan. */
 function factWords({ faces, is_of_points, repair }: ScanFacts): string[] {
   const dropped = repair.dropped_not_finite + repair.dropped_zero_area + repair.dropped_duplicates;
   const counted: Array<[TextKey, number, number]> = [

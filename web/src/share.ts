@@ -5,7 +5,7 @@ import type { Operating } from "./operating";
 
 interface Invitation {
   link: string;
-  /** QR code of the link, row by row: 1 where it is dark. */
+  /** QR code of the link, row by row: 1 for a dark module. */
   code: string[];
 }
 

@@ -1,13 +1,13 @@
 /**
- * The stage that everything three-dimensional stands on: renderer, camera, light, and the one place that decides when to draw.
+ * The stage of everything three-dimensional: renderer, camera, light, and the one place that decides when to draw.
  *
- * It draws when somebody asked for it, once per frame of the screen, and rests else: a tablet stays cool beside the cell.
+ * It draws on request, once per frame of the screen, and rests else: a tablet stays cool beside the cell.
  */
 import { DirectionalLight, HemisphereLight, PerspectiveCamera, Scene, WebGLRenderer } from "three";
 
-/** Main-thread times of frames that are remembered, for tests. */
+/** Number of remembered main-thread times of frames, for tests. */
 const REMEMBERED = 600;
-/** More pixels than this for each point of the screen nobody sees. */
+/** More pixels than this for each point of the screen are invisible. */
 const MOST_PIXEL_RATIO = 2;
 
 export class Stage {
@@ -18,9 +18,9 @@ export class Stage {
   readonly frameTimes: number[] = [];
   /** Called before each frame, in order. */
   readonly beforeFrame: Array<() => void> = [];
-  /** Called after each frame, to move what is HTML. */
+  /** Calls after each frame, to move HTML. */
   readonly afterFrame: Array<() => void> = [];
-  /** Frames are so far apart at least, ms: while the arm's button is held its beats go first. */
+  /** Least time between frames, ms: while somebody holds the arm's button its beats go first. */
   leastInterval = 0;
   private lastFrame = 0;
   private isAsked = false;
@@ -49,7 +49,7 @@ export class Stage {
     else draw();
   }
 
-  /** Resolves when nothing waits to be drawn. */
+  /** Resolves after all requested drawing. */
   idle(): Promise<void> {
     if (!this.isAsked) return Promise.resolve();
     return new Promise((resolve) => this.resting.push(resolve));
@@ -60,7 +60,7 @@ export class Stage {
     return { width: Math.max(clientWidth, 1), height: Math.max(clientHeight, 1) };
   }
 
-  /** Red, green, blue, alpha of one place of the picture, which is drawn anew for it: what was drawn is not kept. */
+  /** Red, green, blue, alpha of one place of the picture, drawn anew for it: the browser does not keep the picture. */
   pixel(x: number, y: number): number[] {
     for (const each of this.beforeFrame) each();
     this.renderer.render(this.scene, this.camera);

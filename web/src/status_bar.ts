@@ -1,6 +1,5 @@
 /**
- * The bar at the top: which part and session, whether the line stands, whether what comes from the sensors is used and what to do
- * if not, who looks and who operates, language and theme.
+ * The bar at the top: part and session, state of the line, use of the sensors' data with its remedy, role of the page, language and theme.
  */
 import { button, el, say, write } from "./dom";
 import { onLanguage, t } from "./language";
@@ -9,7 +8,7 @@ import { settingsMenu } from "./settings_menu";
 import type { TextKey } from "./texts";
 
 const INPUT_TEXTS: TextKey[] = ["inputGood", "inputDoubtful", "inputWrong", "inputStale"];
-/** What is over sooner, in messages of one each second, does not push the picture down. */
+/** A shorter disturbance, in messages of one each second, does not push the picture down. */
 const ENDURED = 3;
 
 export class StatusBar {
@@ -20,7 +19,7 @@ export class StatusBar {
   private readonly role = el("span", { class: "pill plain" });
   /** Messages in a row that said something is wrong. */
   private badSince = 0;
-  /** What the node says about its input, under the bar while it is not good. */
+  /** The node's words on its input, under the bar while it is not good. */
   readonly remedy = el("div", { class: "remedy", attributes: { role: "status" } });
 
   constructor(

@@ -1,4 +1,4 @@
-/** After a tap on what was touched: the touch behind the place, drawn as a line, can be taken out, and put back again. */
+/** After a tap on a touched place: the touch behind it appears as a line; the user can take it out, and put it back again. */
 import { button, el, write } from "./dom";
 import { onLanguage, t } from "./language";
 import type { Xyz } from "./messages";
@@ -8,7 +8,7 @@ import type { TextKey } from "./texts";
 import { type FoundTouch, type Place, putBackRequest, takeOutRequest, TouchChoice } from "./touch_choice";
 
 const SERVICE = "~/take_out_touch";
-/** All other touches are made again, which takes a while after a long day, ms. */
+/** The node makes all other touches again, which takes a while after a long day, ms. */
 const WITHIN = 300_000;
 
 export class TakeOut {
@@ -16,7 +16,7 @@ export class TakeOut {
   readonly element = el("div", { class: "take-out", attributes: { hidden: "" } });
   private readonly words = el("p", { class: "muted" });
   private readonly choice: TouchChoice;
-  /** Called when it is taken out, so that the menu goes. */
+  /** Called after a removal, so that the menu goes. */
   onTaken: () => void = () => {};
 
   /** @param showLine draws a touch; nothing for none. */

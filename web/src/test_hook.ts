@@ -1,6 +1,6 @@
 /**
- * For tests only: `window.touchup` says what a test needs to compare the picture with rays cast onto the saved mesh, and how long
- * frames take. Nothing of the page uses it, and nothing can be changed by it.
+ * For tests only: `window.touchup` has the values that a test needs to compare the picture with rays cast onto the saved mesh, and the
+ * times of frames. The page does not use it, and it changes nothing.
  */
 import type { MeshStore } from "./mesh_store";
 import type { Picture } from "./picture";
@@ -12,7 +12,7 @@ export interface TestHook {
   faceCount(): number;
   /** Column-major matrices; places of the part in m go by projection · view to -1..1, y up. */
   camera(): { view: number[]; projection: number[]; width: number; height: number; pixelRatio: number };
-  /** Resolves when nothing waits to be drawn. */
+  /** Resolves after all requested drawing. */
   idle(): Promise<void>;
   /** Of the main thread for each of the last frames, ms. */
   frameTimes(): number[];

@@ -1,7 +1,7 @@
 /**
- * Every text of the page, in every language it speaks: English, German, Spanish, in this order. `{name}` is replaced.
+ * Every text of the page, in every language it speaks: English, German, Spanish, in this order. A value replaces `{name}`.
  *
- * Words are those of the trade where it has them (ISO 286, ISO 1101, ISO 14253), and plain ones else.
+ * Words are those of the trade if it has them (ISO 286, ISO 1101, ISO 14253), and plain ones else.
  */
 
 import { replayTexts } from "./texts_replay";

@@ -1,6 +1,6 @@
 /**
- * The tip of the stylus, live: a ball of its size, a shadow of it where the part hides it, the force that it feels as an arrow, and
- * the green arrow onto where to touch next.
+ * The tip of the stylus, live: a ball of its size, a shadow of it while the part hides it, the measured force as an arrow, and the green
+ * arrow onto the next touch.
  */
 import { Group, Mesh, MeshBasicMaterial, MeshLambertMaterial, SphereGeometry, Vector3 } from "three";
 import { Arrow } from "./arrow";
@@ -14,7 +14,7 @@ const DELETE = 2;
 
 /** Length of the force's arrow for 1 N, in radii of the tip. */
 const PER_NEWTON = 2.5;
-/** Below this nobody sees or feels it, N. */
+/** Smaller forces are invisible and imperceptible, N. */
 const LEAST_FORCE = 0.02;
 
 const COLOURS = { tip: "#d55e00", force: "#cc79a7", next: "#00b37d" };
@@ -27,7 +27,7 @@ export interface TipState {
   distance: number | null;
   /** Where to touch next, m. */
   next: Vector3 | null;
-  /** Against what it felt last, N. */
+  /** Against the last measured force, N. */
   force: number;
 }
 

@@ -1,7 +1,4 @@
-/**
- * Which touch may be taken out: the one behind a place of the part, as the node finds it; what is answered to an earlier question is
- * forgotten.
- */
+/** The removable touch: the one behind a place of the part, as the node finds it; the page drops answers to an earlier question. */
 import type { MeshStore } from "./mesh_store";
 import { QUALITY } from "./mesh_store";
 import type { Answer, Xyz } from "./messages";
@@ -24,10 +21,10 @@ export interface FoundTouch extends Answer {
 export type Place = readonly [number, number, number];
 type Ask = (request: object) => Promise<FoundTouch>;
 
-/** `support` of a vertex that was touched. */
+/** `support` of a touched vertex. */
 const TOUCHED = 1;
 
-/** Whether a face is of what was touched: one of its corners is. */
+/** Whether a touch supports a face, by one of its corners. */
 export function isTouched(store: MeshStore, face: number): boolean {
   const corners = store.corners.subarray(3 * face, 3 * face + 3);
   return corners.some((vertex) => store.quality[4 * vertex + QUALITY.support] === TOUCHED);
@@ -42,7 +39,7 @@ export class TouchChoice {
     private readonly onChange: () => void,
   ) {}
 
-  /** Looks for the touch at a place of the part, m; none is chosen until it is found. */
+  /** Looks for the touch at a place of the part, m; there is no choice until the answer. */
   async look([x, y, z]: Place, frame: string): Promise<void> {
     this.forget();
     const question = this.questions;

@@ -1,4 +1,4 @@
-/** A number for each of some vertices, beside the mesh: what it is coloured by and no patch says. */
+/** A number for each of some vertices, beside the mesh: values for its colours that no patch has. */
 import { CdrError } from "./cdr";
 
 /** First byte of such a frame. */
@@ -8,9 +8,9 @@ const HEAD = 8;
 
 /** The second byte: which number. */
 export const WHICH = {
-  /** From the nominal part, m; NaN where that is far. */
+  /** From the nominal part, m; NaN far from it. */
   deviation: 1,
-  /** 1 where a contact nearby was rejected; vertices that are not named have none. */
+  /** 1 near a rejected contact; unnamed vertices have none. */
   outlier: 3,
 } as const;
 

@@ -1,4 +1,4 @@
-/** Buttons over the picture: from where the part is looked at, and the force at the tip. */
+/** Buttons over the picture: directions of view, and the force at the tip. */
 import type { CameraMan, ViewName } from "./camera_man";
 import { button, el, write } from "./dom";
 import { onLanguage, t } from "./language";
@@ -27,7 +27,7 @@ export class ViewBar {
 
 /** Full length of the bar, N; harder presses fill it. */
 const FULL = 10;
-/** A force that nobody measured for so long is not shown any more, ms. */
+/** Age at which the display drops a force, ms. */
 const LASTS = 2000;
 /** Above this a stylus presses harder than it should, N. */
 const HARD = 6;

@@ -49,7 +49,7 @@ export class CdrWriter {
   }
 }
 
-/** A patch that changes nothing but what is given. */
+/** A patch that changes only the given fields. */
 export function patch(given: Partial<MeshPatch>): MeshPatch {
   return {
     session: "s", version: 1, baseVersion: 0, part: 0, partCount: 1, removedFaces: new Uint32Array(), vertices: new Uint32Array(),

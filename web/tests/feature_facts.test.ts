@@ -1,4 +1,4 @@
-/** What a feature says in words and what it wants most, on cases worked by hand. */
+/** Words and needs of a feature, on cases worked by hand. */
 import { describe, expect, it } from "vitest";
 import { isAsked, isMinor, mainWords, need, nearestTo, sizes, title, urgency } from "../src/feature_facts";
 import { FittedTo, Kind, type NotedFeature, Status } from "../src/messages";

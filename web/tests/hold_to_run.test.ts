@@ -1,4 +1,4 @@
-/** Beats come each 20 ms while the button is held, and end with everything that makes it doubtful that a hand is on it. */
+/** Beats come each 20 ms while somebody holds the button, and end with every doubt about the hand on it. */
 import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
 import { BEAT, HoldToRun } from "../src/hold_to_run";
 

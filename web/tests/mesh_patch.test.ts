@@ -1,4 +1,4 @@
-/** What the decoder reads is what an independent writer wrote, without copies; what is no patch is refused with one clear error. */
+/** The decoder reads the bytes of an independent writer, without copies; anything else is one clear error. */
 import { describe, expect, it } from "vitest";
 import { CdrError } from "../src/cdr";
 import { decodeMeshPatch } from "../src/mesh_patch";

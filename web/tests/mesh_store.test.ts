@@ -1,4 +1,4 @@
-/** The store against a naive model (maps by number) under random edits; gaps are told; the dirty stretches cover what changed. */
+/** The store against a naive model (maps by number) under random edits; it reports gaps; the dirty stretches cover the changes. */
 import { describe, expect, it } from "vitest";
 import type { MeshPatch } from "../src/mesh_patch";
 import { GapError, MeshStore, QUALITY } from "../src/mesh_store";

@@ -1,4 +1,4 @@
-/** Every text is there in every language, is used, and no words of the page go around the table. */
+/** Every text is there in every language, the page uses it, and no words of the page go around the table. */
 import { readdirSync, readFileSync } from "node:fs";
 import { describe, expect, it } from "vitest";
 import { LANGUAGES, texts } from "../src/texts";
@@ -44,7 +44,7 @@ function looksLikeWords(literal: string): boolean {
   return /[äöüßñáéíóúÄÖÜ¿¡]/.test(literal) || /(^|[^\w-])[A-Z][a-z]+( |$)/.test(literal);
 }
 
-/** What has a capital and is no text: names of keys, and where nobody can have chosen a language yet. */
+/** Literals with a capital that are no text: names of keys, before any choice of a language. */
 const NAMES = new Set(["Enter", "Escape"]);
 
 describe("the code", () => {

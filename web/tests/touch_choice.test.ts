@@ -1,4 +1,4 @@
-/** Which touch is offered to be taken out, whatever order answers come in. */
+/** The offered touch for any order of answers. */
 import { describe, expect, it } from "vitest";
 import type { MeshStore } from "../src/mesh_store";
 import { type FoundTouch, isTouched, putBackRequest, takeOutRequest, TouchChoice } from "../src/touch_choice";
@@ -7,7 +7,7 @@ function found(sec: number, success = true): FoundTouch {
   return { success, message: "", touch: { sec, nanosec: 250 }, contacts: 7, points: [] };
 }
 
-/** A node that answers when it is told to. */
+/** A node that answers on command. */
 function node(): { asked: object[]; answer: Array<(touch: FoundTouch) => void>; ask: (request: object) => Promise<FoundTouch> } {
   const asked: object[] = [];
   const answer: Array<(touch: FoundTouch) => void> = [];

@@ -3,7 +3,7 @@ import { CdrError } from "../src/cdr";
 import { FAR, MeshStore, QUALITY } from "../src/mesh_store";
 import { decodeVertexNumbers, isVertexNumbers } from "../src/vertex_numbers";
 
-/** Written byte by byte, as the frame is described. */
+/** Written byte by byte, as in the description of the frame. */
 function frame(vertices: number[], numbers: number[], kind = 2, which = 1): ArrayBuffer {
   const bytes = new ArrayBuffer(8 + 8 * vertices.length);
   const view = new DataView(bytes);
