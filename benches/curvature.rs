@@ -1,4 +1,4 @@
-//! How long do curvature and its clusters take on a scan of 1M vertices, in order and in disorder?
+//! Time of curvature and its clusters on a scan of 1M vertices, in order and in disorder.
 
 use divan::{Bencher, black_box};
 use nalgebra::Point3;

@@ -187,7 +187,7 @@ fn session(mesh: &mut TriMesh, tree: &mut FaceTree) -> Times {
                 replace(mesh, tree, &old, &new, &mut made)
             });
         }
-        // the last round of a spot leaves it as it is
+        // the last round of a spot keeps its edit
         if round % ROUNDS_PER_SPOT + 1 < ROUNDS_PER_SPOT {
             let finer = made.clone();
             replace(mesh, tree, &finer, &old_corners, &mut made);

@@ -59,7 +59,7 @@ fn tile(id: i32) -> Marker {
 
 /// Number of features, more than an answer can name.
 const FEATURES: u32 = 300;
-/// As many as an answer of the node names at most.
+/// Largest number that an answer of the node names.
 const MOST_NAMED: u32 = 128;
 /// Of one probing.
 const TOUCHES: u32 = 20;

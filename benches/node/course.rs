@@ -39,8 +39,7 @@ impl Times {
 pub struct Answers {
     /// time of the first sample, ns since 1970, a whole second
     pub begin_ns: i64,
-    /// for each second the samples that were not answered, and how long the answers to the others
-    /// took
+    /// for each second the unanswered samples, and the times of the answers to the others
     pub seconds: Vec<(u64, Option<Times>)>,
 }
 

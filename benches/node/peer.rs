@@ -92,7 +92,7 @@ fn writer<M: RosMessage>(node: &mut Node, name: &str) -> Publisher<M> {
         .expect("a node publishes")
 }
 
-/// Returns when all of `wanted` readers and writers have somebody at the other end.
+/// Returns when all of `wanted` readers and writers have a match at the other end.
 fn wait_for_matches(context: &Context, wanted: usize) {
     let events = context.domain_participant().status_listener();
     let (begun, mut matched) = (Instant::now(), 0);
@@ -153,7 +153,7 @@ impl Tiles {
     }
 }
 
-/// Joins; returns how many tiles the mesh has and how long they took to come.
+/// Joins; prints the number of tiles of the mesh and the time until the last.
 pub fn join_late(domain: u16) {
     let begun = Instant::now();
     let (_context, mut node) = joined(domain, "late");
@@ -179,7 +179,7 @@ struct Viewer {
     drawn: HashMap<VertexBits, i64>,
     /// vertices reported at a place and not yet drawn there
     pending: HashMap<VertexBits, u32>,
-    /// of each of these vertices the stamps of the samples that moved it, ns, and where to, in
+    /// of each of these vertices the stamps of the samples that moved it, ns, and its new place, in
     /// their order
     moves: HashMap<u32, Vec<(i64, VertexBits)>>,
     visible: Latencies,

@@ -42,7 +42,7 @@ use rtde::Stream;
 const DASHBOARD: u16 = 29999;
 const SCRIPT: u16 = 30003;
 const RTDE: u16 = 30004;
-/// How often it looks whether a period may pass.
+/// Interval of the checks for a period.
 const LOOK: Duration = Duration::from_micros(500);
 /// The holes of the part are polygons within this of their circles, m.
 const CHORD: f64 = 2e-6;
@@ -161,7 +161,7 @@ fn main() -> anyhow::Result<()> {
                 }
                 println!("{line}");
             }
-            // every other thread waits for somebody
+            // every other thread blocks on its peer
             eprintln!("ur_controller: {address} ends");
             std::process::exit(0);
         });

@@ -326,7 +326,7 @@ fn numbers(seed: u8) -> Vec<u8> {
 /// Of the files.
 ///
 /// # Panics
-/// Where SQLite makes no database.
+/// If SQLite makes no database.
 #[expect(clippy::too_many_lines)]
 pub fn write(folder: &Path) -> std::io::Result<()> {
     let triangle = [[0f32; 3], [20.0, 0.0, 0.0], [0.0, 20.0, 0.0]].concat();

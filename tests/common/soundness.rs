@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::{Point3, Vector3};
 use touchup::mesh::{FaceId, TriMesh};
 
-/// How the faces of a mesh meet.
+/// Connection of the faces of a mesh.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Soundness {
     /// edges with one face, as ordered pairs of vertices

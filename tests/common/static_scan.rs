@@ -24,7 +24,7 @@ pub struct StaticScan {
     pub after: Option<TriMesh>,
     /// height of the tip in B at the wish to end, and the least since then, m
     pub since_then: Option<[f64; 2]>,
-    /// the true part in its cell, and how near to it the centre of the ball came, m
+    /// the true part in its cell, and the least distance of the ball's centre from it, m
     pub part: Option<(Plate, RobotCell)>,
     pub nearest: f64,
 }

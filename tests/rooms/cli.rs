@@ -1378,7 +1378,7 @@ fn simulate_makes_the_input_of_refine() {
 // ---- step
 // -------------------------------------------------------------------------------------------------------
 
-/// A linear spring at rest under no force: h = 0 stays 0, whatever the rest.
+/// A linear spring at rest under no force: h = 0 stays 0 for any other numbers.
 #[test]
 fn step_answers_each_line_in_order_and_goes_on_after_a_bad_one() {
     let good = r#"{"p_m":[0,0,0],"force_n":[0,0,0],"b_m":[0,0,0],"n":[0,0,1],"dt_s":0.001,"k_n_per_m":1000,"alpha_m_per_n_s":0.1,"beta_per_n2_s":0.1,"step":"lie","along":"normal0"}"#;
@@ -1475,7 +1475,7 @@ fn the_version_names_the_commit() {
 // ---- stdout that takes nothing
 // ------------------------------------------------------------------------------------
 
-/// A result that did not reach stdout was not written: exit 1, whatever the verb.
+/// A result that did not reach stdout does not exist: exit 1 for any verb.
 #[test]
 fn a_result_that_stdout_does_not_take_is_1() {
     let folder = tempfile::tempdir().unwrap();

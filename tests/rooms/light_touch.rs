@@ -18,7 +18,7 @@ const TIP: TipParams = TipParams {
     radius: 1.5e-3,
     stiffness: Some(2e4),
 };
-/// How much lower than the scan the ball goes, m.
+/// Depth of the ball below the scan, m.
 const BELOW: f64 = 1e-3;
 
 /// A ball that goes to and fro at 40 mm/s, 1 mm below the scan at z = 0, and presses upwards as a

@@ -1,5 +1,5 @@
-//! The patch beside the haptic update: the same skin as all at once, sound at every moment,
-//! whatever the machine does.
+//! The patch beside the haptic update: the same skin as all at once, sound at every moment, for any
+//! delays of the machine.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -629,7 +629,7 @@ fn a_touch_moves_the_mesh_at_once_and_is_in_the_patch_within_50_ms() {
     assert!(at_once > 50 && late < 40);
 }
 
-/// Triangles by the positions of their corners, in order, whatever their ids.
+/// Triangles by the positions of their corners, in order, independent of ids.
 fn triangles(mesh: &TriMesh) -> Vec<[[u64; 3]; 3]> {
     let mut triangles: Vec<_> = mesh
         .faces()

@@ -263,7 +263,7 @@ fn a_scene_says_what_differs() {
     );
 }
 
-/// The default radius is nobody's word, and a point has none.
+/// The default radius has no source, and a point has no radius.
 #[test]
 fn a_radius_is_told_by_somebody() {
     let told = |yaml: &str| {
@@ -976,8 +976,8 @@ fn a_scene_reports_what_is_built_of_it_and_what_is_left_out() {
         )),
         "{off}"
     );
-    // the mode of the paper takes neither contact, sliding, carving, guard nor a patch, whatever
-    // the scene names
+    // the mode of the paper takes neither contact, sliding, carving, guard nor a patch, even if the
+    // scene names them
     let paper = built(
         "contact:\ntip:\nsliding:\ncarve:\npatch:\nuncertainty:\nguard:\nrefine: { mode: paper }",
     );

@@ -391,7 +391,7 @@ fn a_job_is_what_refine_does() {
     }
 }
 
-/// First while it waits for its scan, a pipe that nobody writes to; then at whatever it does once
+/// First while it waits for its scan, a pipe without a writer; then at any point of its work once
 /// its first file is there.
 #[test]
 fn a_killed_job_leaves_nothing_half_and_the_next_one_gives_the_same_bytes() {

@@ -733,7 +733,7 @@ fn a_second_client_is_refused_and_disturbs_nothing() {
         let mut arm = stand_in.connect(packages);
         let params = stand_in.params(packages);
         let second = thread::spawn(move || UrArm::connect(&params).err().unwrap());
-        // up and down: how long that takes is no matter
+        // up and down, for any duration
         for speed in [20e-3, -20e-3].into_iter().cycle() {
             let linear = Vector3::new(0.0, 0.0, speed);
             go_for(

@@ -1,4 +1,4 @@
-//! Lines, velocities and presses, and how they end on command.
+//! Lines, velocities and presses, and their ends on command.
 
 use crate::Onlooker;
 use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};

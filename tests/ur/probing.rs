@@ -32,7 +32,7 @@ pub fn cell(stand_in: &StandIn, packages: &Path) -> TempDir {
     folder
 }
 
-/// The through hole of the plate, Ø 8 mm at (16, 36), of which the scan shows nothing.
+/// The through hole of the plate, Ø 8 mm at (16, 36), invisible in the scan.
 #[test]
 #[ignore = "a slow proof"]
 fn a_ur_probes_a_hole_from_one_click() {

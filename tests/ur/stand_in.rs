@@ -126,7 +126,7 @@ impl StandIn {
         assert_eq!(self.answer(), fault);
     }
 
-    /// Lets some time of the controller pass, whatever the client sends, ms.
+    /// Lets some time of the controller pass, independent of its client, ms.
     pub fn run(&mut self, ms: u32) {
         self.send(&format!("run {ms}"));
     }

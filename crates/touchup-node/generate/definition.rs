@@ -45,22 +45,22 @@ pub struct Constant {
 pub struct Field {
     /// type of one: a basic one, or package and name
     pub item: String,
-    /// how many of them
+    /// number of its elements
     pub length: Length,
     /// in snake_case
     pub name: String,
-    /// when nobody sets it
+    /// of a parameter without another value
     pub default: Option<String>,
     /// with the largest length, if there is one
     pub comment: String,
 }
 
-/// How many a field has.
+/// Number of elements of a field.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Length {
     /// it is no list
     One,
-    /// as many as the message says
+    /// the message says how many
     Any,
     /// always as many
     Fixed(usize),

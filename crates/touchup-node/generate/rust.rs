@@ -289,7 +289,7 @@ fn trailed(name: &str) -> String {
     }
 }
 
-/// Where r2r has it.
+/// Path of the message in r2r.
 fn path(message: &Message) -> String {
     let Message {
         package,

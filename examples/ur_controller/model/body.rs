@@ -25,13 +25,13 @@ const STEP: f64 = PERIOD / STEPS as f64;
 const TURN_ACCELERATION: f64 = 10.0;
 /// With which it stops when it has to, m/s².
 pub const HARD_STOP: f64 = 8.0;
-/// A part that rises does so with this speed, m/s: one that jumped over the ball would hold it
-/// inside.
+/// Speed of a rising part, m/s: one that jumped over the ball would hold it inside.
 const RISING: f64 = 30e-3;
 /// States that a spike lasts.
 const SPIKE: u32 = 3;
 
-/// Commanded motion of the tip: a velocity, m/s and rad/s in B, and how fast it may change, m/s².
+/// Commanded motion of the tip: a velocity, m/s and rad/s in B, and its largest rate of change,
+/// m/s².
 #[derive(Clone, Copy, Debug)]
 pub struct Motion {
     pub linear: Vector3<f64>,

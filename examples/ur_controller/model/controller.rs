@@ -83,7 +83,7 @@ struct Program {
     /// state of the thread of `speedL`: the velocity, and the time of the next one, s; without a
     /// time, when it has reached that velocity
     speeding: Option<(Motion, Option<f64>)>,
-    /// how long it stays at one, s
+    /// duration of one velocity, s
     speed_time: f64,
     /// cycles of its main loop; `None`: it does not count them
     count: Option<i32>,
@@ -116,7 +116,7 @@ pub struct Controller<'a> {
     is_heard: bool,
     /// looks at the clock since the last period, for want of a word of the client
     quiet_looks: u32,
-    /// until when the clock goes on whatever comes, s
+    /// time until which the clock runs unconditionally, s
     granted_until: f64,
     /// the connection whose inputs count
     pub owner: Option<u64>,
@@ -213,7 +213,7 @@ impl<'a> Controller<'a> {
         (self.heard_at, self.is_heard) = (self.body.time, true);
     }
 
-    /// Some time passes whatever comes, s.
+    /// Lets some time pass unconditionally, s.
     pub fn grant(&mut self, seconds: f64) {
         self.granted_until = self.granted_until.max(self.body.time) + seconds;
     }

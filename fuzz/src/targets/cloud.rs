@@ -20,7 +20,7 @@ pub fn run(data: &[u8]) {
         return;
     };
     let points = cloud.positions;
-    // of all formats the packed one says most: a field of a byte, 88 of which lie in one
+    // of all formats the packed one holds the most: 88 points in a byte
     assert!(
         points.len() <= 88 * bytes.len(),
         "{} points of {} bytes",

@@ -590,9 +590,9 @@ fn refined_case(name: &str, folder: &Path) -> Option<[PathBuf; 2]> {
     Some([out, case.join("truth.ply")])
 }
 
-// A third to a half of these meshes is the bare scan, 0.6 mm noisy and 0.3 mm too large, so the fit
-// is as good as that. From above the flange has a half turn that the touches do not break: the
-// dowel hole is on the other side.
+// A third to a half of these meshes is the bare scan, 0.6 mm noisy and 0.3 mm too large, and limits
+// the fit. From above the flange has a half turn that the touches do not break: the dowel hole is
+// on the other side.
 #[test]
 #[ignore = "a slow proof"]
 fn refined_meshes_come_onto_their_truth_from_anywhere() {

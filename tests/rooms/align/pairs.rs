@@ -139,7 +139,7 @@ fn a_sigma_that_the_residuals_contradict_is_not_believed() {
     );
 }
 
-/// By hand: two pairs that count four times as much as the other two draw the shift to their mean.
+/// By hand: two pairs with four times the weight of the other two draw the shift to their mean.
 #[test]
 fn sigmas_are_weights() {
     let square = [
@@ -256,7 +256,7 @@ fn pairs_on_a_line_are_refused() {
     );
 }
 
-/// With five pairs or more the finding names the wrong one, whichever it is; fewer disagree.
+/// With five pairs or more the finding names any wrong one; fewer disagree.
 #[test]
 fn a_pair_that_does_not_fit_is_named() {
     for seed in 0..50 {
@@ -296,7 +296,7 @@ fn a_pair_that_does_not_fit_is_named() {
     assert!((0..50).all(|seed| fit(&pairs_of(&motion(), 1e-3, seed)).is_ok()));
 }
 
-/// As many as a file can hold: the time does not grow with their square.
+/// The largest number in a file: the time does not grow with its square.
 #[test]
 fn a_hundred_thousand_pairs_are_fitted_at_once() {
     let mut rng = Pcg64Mcg::seed_from_u64(8);

@@ -399,7 +399,7 @@ fn results_are_printed_and_written_and_bad_data_is_3() {
         new.contains("# touchup calibrate scan: 5 pairs, residuals 0.000 mm rms"),
         "{new}"
     );
-    // a whole scene, but for the radius of the ball, which nobody has told
+    // a whole scene, but for the radius of the ball, which has no source
     let scene = touchup::scene::Scene::read(Path::new(&out)).unwrap();
     assert!(scene.scan_to_space.is_some());
     assert_eq!(

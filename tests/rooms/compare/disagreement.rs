@@ -253,7 +253,7 @@ fn a_part_that_was_not_changed_is_not_called_changed() {
                 report["classes"],
                 report["regions"]
             );
-            // the simulated value, as far as a few dozen independent places determine it
+            // the simulated value, to the accuracy of a few dozen independent places
             let noise = report["scanner"]["noise_mm"].as_f64().unwrap();
             assert!(
                 (0.5..1.6).contains(&(noise / (scanner.noise * 1e3))),

@@ -100,7 +100,7 @@ fn findings(input: &ToldRecording) -> Vec<InputFinding> {
     monitor.findings(&input.scan, &FaceTree::new(&input.scan))
 }
 
-/// Mistakes that are not the first and sure finding, of how many.
+/// Mistakes other than the first and sure finding, and their total.
 fn missed(seed: u64) -> (Vec<&'static str>, usize) {
     let sound = simulated(seed);
     assert_eq!(findings(&sound), [], "seed {seed}");

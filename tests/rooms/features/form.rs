@@ -60,7 +60,7 @@ fn displacement(p: &Point3<f64>, lean: f64) -> Vector3<f64> {
 
 impl Worn {
     /// A point of the plate after its displacement, seen from `p`. Along the surface it moves with
-    /// `p`: the floor below a ball stays straight below, whatever the displacement at its height.
+    /// `p`: the floor below a ball stays straight below, for any displacement at its height.
     fn moved(&self, s: SurfacePoint, p: &Point3<f64>) -> SurfacePoint {
         const STEP: f64 = 1e-6;
         let slope = |axis: Vector3<f64>| {

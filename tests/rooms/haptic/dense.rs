@@ -59,8 +59,8 @@ fn samples() -> impl Iterator<Item = Sample> {
     })
 }
 
-/// The mesh that the haptic update alone makes of a scan, and how many vertices it moved at most at
-/// one sample.
+/// The mesh that the haptic update alone makes of a scan, and the largest number of vertices that
+/// it moved at one sample.
 fn touched(scan: &TriMesh) -> (TriMesh, usize) {
     let mut engine = Engine::new(
         scan.clone(),
@@ -93,8 +93,7 @@ fn a_dense_scan_goes_where_it_was_touched_and_keeps_its_texture() {
     let (mesh, most) = touched(&scan);
     // the region of the tip has 700 vertices of this scan
     assert!(most < 60, "{most} vertices in one update");
-    // a smooth scan of edges about as long as those that the update works on, and the root mean
-    // square of the texture
+    // a smooth scan with edges of the update's own length, and the root mean square of the texture
     let coarse = grid(21, 0.76e-3, |_, _| ABOVE);
     let of_coarse = left(&coarse, &touched(&coarse).0, |_, _| 0.0);
     let of_dense = left(&scan, &mesh, texture);
@@ -172,7 +171,7 @@ fn watched(scan: &TriMesh) -> Engine {
     engine
 }
 
-/// The corners of all faces, as bits, whatever the order of the faces.
+/// The corners of all faces, as bits, in an order of their own.
 fn triangles(mesh: &TriMesh) -> Vec<[[u64; 3]; 3]> {
     let bits = |v: VertexId| mesh.position(v).coords.map(f64::to_bits).into();
     let mut all: Vec<_> = mesh.faces().map(|(_, corners)| corners.map(bits)).collect();
@@ -255,7 +254,7 @@ fn a_dense_scan_is_shown_with_its_own_faces_and_those_of_the_patch() {
         "{}",
         working.face_count()
     );
-    // the texture, and how far coarse faces of the scan are off it
+    // the texture, and the deviation of coarse faces of the scan from it
     let [there, back] = [farthest(shown, working), farthest(working, shown)];
     assert!(
         there < 3.0 * HEIGHT && back < 3.0 * HEIGHT,

@@ -553,7 +553,7 @@ fn check_extremes(
             let towards = force.try_normalize(0.0).unwrap_or(n);
             assert!(after.n.dot(&n.cross(&towards)).abs() <= 8.0 * f64::EPSILON);
             let farthest = alpha_m_per_n_s * (force.norm() + f_max_n) * dt * (1.0 + 1e-9);
-            // of sizes of which nothing underflows
+            // for sizes without underflow
             let is_bounded = !spring && params.rule == StepRule::Lie && !may_overflow;
             assert!(
                 !is_bounded || after.b.coords.norm() <= farthest,

@@ -431,7 +431,7 @@ fn check_push(shake: &[f64], centre: &Vector3<f64>, force: &Vector3<f64>, depth:
         assert!(
             (mismatch.linear + mismatch.expected_force_o - measured).norm() <= 8.0 * EPSILON * size
         );
-        // the cross product is normal to both, and is as long as its parallelogram
+        // the cross product is normal to both, and its length is the area of their parallelogram
         let squared = mismatch.expected_force_o.norm_squared() * measured.norm_squared();
         let cosine = mismatch.expected_force_o.dot(&measured);
         let area = mismatch.rotational.norm_squared() + cosine * cosine;
@@ -464,8 +464,8 @@ fn check_push(shake: &[f64], centre: &Vector3<f64>, force: &Vector3<f64>, depth:
         };
         let step = barycentre(&|v| refiner.mesh().position(v) - before[v.0 as usize]).dot(&normal);
         // in a millisecond the handle goes e^−0.025 a·n of its distance to rest along the force, or
-        // as far as no corner goes farther than a step may; a turn about the barycentre does not
-        // move that
+        // less, so that no corner goes farther than a step may; a turn about the barycentre does
+        // not move that
         let cosine = normal.dot(&n);
         let free = (h + measured.dot(&n) / 2e4) / cosine * -(-0.025 * cosine).exp_m1();
         let is_free = handle < LONGEST_STEP && refiner.counts().cut_back == 0 && tick > 1;
@@ -806,7 +806,7 @@ fn the_worst_turns_of_eq_7() {
     }
 }
 
-/// At the joint of series and closed form, and where −αkt is denormal or its exponential nothing.
+/// At the joint of series and closed form, and at a denormal −αkt or a vanishing exponential.
 #[test]
 fn the_worst_springs() {
     for z in [
@@ -832,8 +832,8 @@ fn the_worst_springs() {
     }
 }
 
-/// α f_max underflowed though α f_max dt does not, and the face went 1e118 times as far as its rest
-/// point.
+/// α f_max underflowed though α f_max dt does not, and the face went to 1e118 times the distance of
+/// its rest point.
 #[test]
 fn an_underflowing_product_does_not_pass_for_no_time() {
     check_position(
@@ -852,7 +852,7 @@ fn an_underflowing_product_does_not_pass_for_no_time() {
             1e250,
         )
         .unwrap();
-    // T = 1e50: at rest, where f is half of f_max, at h = 0
+    // T = 1e50: at rest, with f half of f_max, at h = 0
     assert!((face.b.z - 1e-200).abs() < 1e-214, "{:e}", face.b.z);
 }
 

@@ -117,8 +117,8 @@ fn a_fat_scan_is_distinguished_from_a_shift_when_it_was_touched_from_all_sides()
     assert!(found.twist.norm() < 1e-5, "{}", found.twist);
 }
 
-/// From one side the surface offset is a shift as far as touches can determine: its own uncertainty
-/// must show.
+/// From one side touches cannot distinguish the surface offset from a shift: its uncertainty must
+/// show.
 #[test]
 fn touched_from_one_side_of_each_axis_the_shift_is_as_uncertain_as_the_surface_offset() {
     let three = [sides()[0], sides()[2], sides()[4]];

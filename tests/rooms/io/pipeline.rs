@@ -616,7 +616,7 @@ fn damage(bytes: &mut Vec<u8>, rng: &mut Pcg64) -> String {
         bytes.truncate(len);
         return format!("cut to {len} bytes");
     }
-    // half of them early, where headers are
+    // half of them early, among the headers
     let span = if within(rng, 0.0, 1.0) < 0.5 {
         bytes.len().min(4096)
     } else {
@@ -699,7 +699,7 @@ fn damaged_recordings_are_refused_or_read_as_far_as_they_go() {
     );
 }
 
-/// Scans as bad as they come, in whichever unit makes them plausible.
+/// Scans of the worst kind, each in a unit that makes it plausible.
 #[test]
 #[ignore = "a slow proof"]
 fn nasty_scans_are_refused_in_one_line_or_refined() {

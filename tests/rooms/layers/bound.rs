@@ -2,7 +2,7 @@
 
 /// Of a count that is to fall to `wanted`.
 pub struct Bound {
-    /// the count of today: whoever lowers the count lowers this too
+    /// the count of today: a change that lowers the count lowers this too
     pub today: usize,
     pub wanted: usize,
 }

@@ -23,7 +23,7 @@ fn circles(mut uses: Uses) -> Vec<String> {
 }
 
 /// Circles of use between the entries of a folder, which are its files and folders: each as the
-/// folder and its entries in the circle, of which `mod` is the file of the folder itself.
+/// folder and its entries in the circle; `mod` is the file of the folder itself.
 ///
 /// - `tests`: modules that do not count.
 fn folder_circles<'a>(uses: &Uses<'a>, tests: &BTreeSet<Module<'a>>) -> BTreeSet<String> {
@@ -80,7 +80,7 @@ fn entries_of_a_folder_use_one_another_one_way() {
     assert!(found.is_empty(), "circles: {found:#?}");
 }
 
-/// How many modules of these files are in circles.
+/// Number of modules of these files in circles.
 fn circles_of(files: &[(&str, &str)]) -> usize {
     let sources: Vec<_> = sources_of(files);
     circles(uses(&sources.iter().collect::<Vec<_>>())).len()

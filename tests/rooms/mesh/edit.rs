@@ -180,7 +180,7 @@ fn distances(mesh: &TriMesh, p: &Point3<f64>) -> Vec<(f64, FaceId)> {
     mesh.faces().map(|(face, _)| (far(face), face)).collect()
 }
 
-/// How squarely `p` lies above a face.
+/// Distance of `p` from a face along its normal, m.
 fn squareness(mesh: &TriMesh, p: &Point3<f64>, face: FaceId) -> f64 {
     (p - triangle::closest_point(p, &mesh.triangle(face)).0)
         .dot(&mesh.normal(face))
@@ -455,7 +455,7 @@ impl Edited {
 }
 
 impl Edited {
-    /// A rebuilt tree names the same faces, where several meet too.
+    /// A rebuilt tree names the same faces, even at places with several nearest ones.
     fn check_against_new_tree(&self, rng: &mut Pcg64) {
         let rebuilt = FaceTree::new(&self.mesh);
         for (face, corners) in self.mesh.faces().step_by(97) {

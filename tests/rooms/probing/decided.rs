@@ -384,10 +384,10 @@ fn deciding_takes_the_touches_that_the_distance_from_the_limit_asks_for() {
     assert!(wrong * 20 <= decided, "{wrong} of {decided}");
 }
 
-/// On a limit a decision in either direction is a matter of chance alone, so it comes out as often
-/// as it may be wrong at the most: no more than 5 %. Who looks after each touch with the guard band
-/// of a single look decides more often than that. Of n cases with 5 % each fewer than 5 % + 2.33
-/// √(0.05 · 0.95 / n) come out in 99 of 100 runs.
+/// On a limit a decision in either direction is a matter of chance alone, so its share is the
+/// permitted share of wrong ones: no more than 5 %. The guard band of a single look, applied after
+/// each touch, decides more often than that. Of n cases with 5 % each fewer than 5 % + 2.33 √(0.05
+/// · 0.95 / n) come out in 99 of 100 runs.
 #[test]
 #[ignore = "a slow proof"]
 fn looking_after_each_touch_keeps_the_stated_risk() {

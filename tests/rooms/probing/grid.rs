@@ -195,7 +195,7 @@ impl Opening {
         ])
     }
 
-    /// Errors of planned touches from a flag up to 2 mm beside it, and how many there were.
+    /// Errors of planned touches from a flag up to 2 mm beside it, and their number.
     fn planned_errors(
         &self,
         quantity: FeatureQuantity,
@@ -298,7 +298,7 @@ fn no_plan_halves_the_error_of_a_grid_on_the_same_wall() {
 
 /// With as many touches as the plan made, including misses and the search for the opening, against
 /// touches spread evenly over wall and surface around it as in a scan, without that search, and
-/// with the same assumption of square walls: the place is better by a third at the least, and no
+/// with the same assumption of square walls: the place is better by at least a third, and no
 /// requested number is worse. The goal is half the error of the place; 200 seeds reach 0.49 to
 /// 0.58.
 #[test]

@@ -791,10 +791,10 @@ fn displaced(
     (explorer.found(), touches)
 }
 
-/// How far contacts are off, by the place of the ball and the number of the touch, mm in O.
+/// Deviation of contacts by the place of the ball and the number of the touch, mm in O.
 type Off = fn(&Point3<f64>, usize) -> Vector3<f64>;
-/// A feature in which contacts agree on another surface: its name, its flag, how far they are off,
-/// and in how many of ten the reason says so at the least.
+/// A feature whose contacts agree on another surface: its name, its flag, their deviation, and the
+/// least number of ten runs whose reason says so.
 type Agreeing = (&'static str, (FeatureKind, [f64; 3]), Off, usize);
 
 const PLANE_AT: (FeatureKind, [f64; 3]) = (FeatureKind::Plane, [45.0, 8.0, 12.0]);
@@ -933,7 +933,7 @@ pub(super) fn flat(x: [f64; 2], y: [f64; 2]) -> TriMesh {
     TriMesh::new(corners.to_vec(), vec![[0, 1, 2], [0, 2, 3]]).unwrap()
 }
 
-/// A block of 40 × 30 × 12 mm, from O on, with one feature near its edges: how far a place is from
+/// A block of 40 × 30 × 12 mm, from O on, with one feature near its edges: distance of a place from
 /// it, m.
 fn near_edges(kind: Option<FeatureKind>, p: &Point3<f64>) -> f64 {
     let (half, middle) = (

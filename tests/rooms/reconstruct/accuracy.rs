@@ -91,8 +91,7 @@ impl Case {
         [forth * 1e3, back * 1e3]
     }
 
-    /// How many of the points along the axis of a hole or slot, 1 mm below its opening, are under a
-    /// face.
+    /// Whether a face covers the place 1 mm below `centre`, the middle of an opening.
     fn is_covered(&self, centre: &Point3<f64>) -> bool {
         let mesh = &self.patched.mesh;
         let below = centre - Vector3::z() * 1e-3;

@@ -339,8 +339,8 @@ fn area(mesh: &TriMesh) -> f64 {
         .sum()
 }
 
-/// The spliced mesh against the scan: one skin with the same rims, nothing else touched. Where
-/// squares stayed open, rims are there and nowhere else.
+/// The spliced mesh against the scan: one skin with the same rims, and no other change. Rims of
+/// their own surround open squares alone.
 fn spliced(scan: &TriMesh, patch: &Patch, pitch: f64) -> TriMesh {
     let mesh = patch.applied_to(scan.clone()).unwrap().0;
     let (before, after) = (soundness(scan), soundness(&mesh));

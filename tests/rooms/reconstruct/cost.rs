@@ -92,8 +92,7 @@ fn a_lattice_around_all_that_was_touched_is_refused_with_the_figure_before_it_is
         assert!(why.contains(part), "{part} is not in: {why}");
     }
     assert_eq!(checked(0.15e-3), Ok(()));
-    // the usual one becomes as coarse as 8 million nodes are, and no coarser than it was where these
-    // suffice
+    // the usual one becomes as coarse as 8 million nodes require, and no coarser if these suffice
     let coarsest = (volume / 8e6).cbrt();
     for pitch in [0.05e-3, 0.1e-3, 0.15e-3] {
         let usual = PatcherParams {

@@ -38,7 +38,7 @@ fn refined(scan: &TriMesh, samples: &[Sample]) -> TriMesh {
     patcher.patched(scan, &FaceTree::new(scan)).unwrap().mesh
 }
 
-/// How far the raster's plane is from the mesh at most, 1 mm inside its ends, mm.
+/// Largest distance of the raster's plane from the mesh, 1 mm inside its ends, mm.
 fn off_plane(mesh: &TriMesh, height_mm: f64) -> f64 {
     let tree = FaceTree::new(mesh);
     let places =

@@ -15,7 +15,7 @@ const RADIUS: f64 = 1.5e-3;
 const CHORD: f64 = 0.1 * RADIUS;
 /// Samples between two renewals on the way: a third of a millimetre.
 const RENEWED_EVERY: usize = 33;
-/// How deep the ball may seem to be in the part by noise alone.
+/// Apparent depth of the ball in the part by noise alone.
 const NOISE: f64 = 0.027 * RADIUS;
 
 /// The patch of a ball that goes along a straight line, without force; made at once, and renewed on

@@ -338,7 +338,7 @@ fn errors_outside_of_the_model_are_not_in_the_stated_uncertainty() {
     );
     assert!(small.2 < 0.75, "95 % are {}", small.2);
 
-    // 2.5 N bend it by 125 µm, of which a stiffness stated 10 % too large leaves 11.4 µm
+    // 2.5 N bend it by 125 µm; a stiffness stated 10 % too large leaves 11.4 µm of that
     let stiff = report("stiffness 10 % large", [1.0, 1.1], Foreign::Nothing);
     assert!((stiff.0 - off + 11.4e-6).abs() < 2e-6, "{}", stiff.0);
     assert!(
@@ -499,7 +499,7 @@ fn disturbed_places(touch: &Touch) -> Vec<Point3<f64>> {
 #[expect(clippy::too_many_lines)]
 fn outliers_are_counted_and_do_not_dent_the_mesh() {
     let (mut places, mut listed, mut errors) = (0, 0, [const { Vec::new() }; 3]);
-    // how many a calm hand loses differs from seed to seed, 21 to 93
+    // the losses of a calm hand differ from seed to seed, 21 to 93
     let mut rejected = [0, 0];
     for seed in 1..=8 {
         let (scan, touch, params) = touched_plate(&StylusParams::default(), seed);

@@ -36,7 +36,7 @@ fn distance_to_triangle(p: &Point3<f64>, t: &[Point3<f64>; 3]) -> f64 {
     sides.iter().map(to_side).fold(f64::MAX, f64::min)
 }
 
-/// How often the mesh winds around a point: 1 inside, 0 outside [solid angles].
+/// Winding number of the mesh around a point: 1 inside, 0 outside [solid angles].
 fn winding_number(p: &Point3<f64>, mesh: &[[Point3<f64>; 3]]) -> f64 {
     let solid_angle = |t: &[Point3<f64>; 3]| {
         let [a, b, c] = t.map(|x| x - p);

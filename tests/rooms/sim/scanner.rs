@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use super::*;
 use touchup::sim::{ScannerParams, measure_quality, scan};
 
-/// Directed edges with how many faces use them.
+/// Directed edges with the numbers of their faces.
 fn directed_edges(mesh: &TriMesh) -> HashMap<(u32, u32), u32> {
     let mut edges = HashMap::new();
     for (_, c) in mesh.faces() {

@@ -51,7 +51,7 @@ fn synchronised(params: SyncParams, messages: &[Message]) -> (Vec<Sample>, SyncC
     (samples, both(sync.counts(), sync.pose_counts()))
 }
 
-/// How many of `messages` are wrenches.
+/// Number of wrenches in `messages`.
 fn count(messages: &[Message]) -> u64 {
     messages
         .iter()
@@ -407,8 +407,7 @@ fn settings_without_meaning_are_refused() {
     }
 }
 
-/// Two streams of different rate with stamps that never repeat, and for each message how late it
-/// arrives, ms.
+/// Two streams of different rate with stamps that never repeat, and for each message its delay, ms.
 fn streams() -> impl Strategy<Value = Vec<(Message, i64)>> {
     let stream = |period: i64, make: fn(i64, f64) -> Message| {
         prop::collection::vec((0..period, 0..20_i64, -1.0..1.0_f64), 1..200).prop_map(

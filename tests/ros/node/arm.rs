@@ -60,8 +60,8 @@ fn what_was_found_is_slid_over_where_that_is_asked_for() {
     cell.end();
 }
 
-/// The through hole of the plate, Ø 8 mm at (16, 36, 12), of which the scan shows nothing; the mesh
-/// follows by the topics.
+/// The through hole of the plate, Ø 8 mm at (16, 36, 12), invisible in the scan; the mesh follows
+/// by the topics.
 #[test]
 #[expect(clippy::too_many_lines)]
 fn a_flagged_hole_is_probed_and_shown() {
@@ -342,8 +342,8 @@ fn a_paused_arm_moves_again_and_one_that_may_not_move_needs_a_start() {
     cell.end();
 }
 
-/// An arm that stops by itself, also when nobody moved it, stands until somebody has looked and
-/// says so.
+/// An arm that stops by itself, even without a motion, stands until an operator has looked and says
+/// so.
 #[test]
 fn a_stop_stands_until_it_is_recovered() {
     let (says, said) = sync_channel(1);
@@ -369,7 +369,7 @@ fn a_stop_stands_until_it_is_recovered() {
         response.message
     );
     for _ in 0..2 {
-        // somebody frees it at its panel, and does not say so
+        // a person frees it at its panel, and does not say so
         say(Safety::Normal);
         let (can_move, why) = cell.state();
         assert!(!can_move && why.contains("~/recover"), "{why}");

@@ -66,7 +66,7 @@ impl Cell {
         cell
     }
 
-    /// As [`Self::on`], whatever becomes of the arm.
+    /// As [`Self::on`], for any state of the arm.
     pub fn begin(
         may_move: bool,
         arm: impl FnOnce(&Clock, &OtherParticipants) -> ArmOfNode,
@@ -180,7 +180,7 @@ impl Cell {
         })
     }
 
-    /// Sends a goal; how it ended.
+    /// Sends a goal; returns its end.
     ///
     /// - `is_cancelled`: cancels the goal
     pub fn send_goal(

@@ -217,7 +217,7 @@ fn what_is_put_back_is_as_if_it_had_never_been_out_also_beside_strokes_that_are_
 
     let [first, second] = [0.2, 0.6].map(|share| near(&plate, share));
     let out = done(&bench, first);
-    // one at a time, and strokes stay as they are meanwhile
+    // one at a time, and strokes stay unchanged meanwhile
     let answers = bench
         .world
         .call(|reply| Call::TakeOut(second.clone(), reply));

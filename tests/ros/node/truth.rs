@@ -443,7 +443,7 @@ fn a_mesh_that_settles_in_a_pause_goes_on_as_if_it_had_not() {
     );
 }
 
-/// The arm of the cell and somebody who plays a recording, on one topic.
+/// The arm of the cell and the player of a recording, on one topic.
 #[test]
 fn samples_of_two_publishers_are_a_warning_with_the_topic() {
     let plate = Plate::touched(0.05);

@@ -19,8 +19,8 @@ const HOLE: Flag = Flag {
     radius: 3e-3,
 };
 
-/// How far the centre of the hole is off, and its diameter, m; number of touches. Truth: Ø 8 mm at
-/// (16, 36).
+/// Error of the centre of the hole, and its diameter, m; number of touches. Truth: Ø 8 mm at (16,
+/// 36).
 fn probed(simulated: &ArmParams, arm: &mut dyn Arm) -> [f64; 3] {
     let ArmParams {
         geometry,

@@ -1,5 +1,5 @@
-//! Whatever goes wrong while it moves with 36 mm/s: it stands within a bound, for a true reason,
-//! and stays.
+//! Faults of any kind while it moves with 36 mm/s: it stands within a bound, for a true reason, and
+//! stays.
 
 use std::time::Duration;
 

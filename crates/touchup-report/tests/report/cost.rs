@@ -302,7 +302,7 @@ fn the_cheapest_scene_moves_the_mesh_as_the_hand_written_loop_does() {
         by_loop > 1e-3 && (0.8..1.25).contains(&(by_scene / by_loop)),
         "{by_scene} and {by_loop}"
     );
-    // the two loops differ in how they find the face and the boxes alone
+    // the two loops differ only in finding the face and in the boxes
     assert_eq!(minimal.mesh.positions(), keeping.mesh.positions());
     let p = slide(1_500, 0.2).pose_ot.translation.vector.into();
     assert_eq!(

@@ -94,8 +94,8 @@ fn two_exact_values_in_one_place_have_no_gaussian_process() {
     assert_eq!(surface.mesh().positions(), before);
 }
 
-/// One touch at height h above a vertex: the vertex goes to where t = h exp(−(t − h)²/2ℓ²), and far
-/// ones stay.
+/// One touch at height h above a vertex: the vertex moves to t = h exp(−(t − h)²/2ℓ²), and far ones
+/// stay.
 #[test]
 fn the_implicit_surface_goes_through_a_touch() {
     let scan = sheet(40, 0.0);

@@ -98,7 +98,7 @@ fn a_rim_with_a_gap_is_one_cluster() {
         .chain(faces.iter().map(|f| f.map(|v| v + shift)))
         .collect();
     let stacked = TriMesh::new(both, twice).unwrap();
-    // eight rims, of which two pairs are 20 µm apart
+    // eight rims, two pairs of them 20 µm apart
     assert_eq!(count(&stacked), [6, 0]);
 }
 
@@ -193,8 +193,8 @@ fn the_mode_of_the_paper_marks_by_curvature() {
         };
         assert_eq!(found.iter().filter(near).count(), 1, "{x} {y}");
     }
-    // marked: where K of the height field, (z_xx z_yy − z_xy²)/(1 + z_x² + z_y²)², is above the
-    // threshold
+    // marks the region in which K of the height field, (z_xx z_yy − z_xy²)/(1 + z_x² + z_y²)², is
+    // above the threshold
     let marked: usize = found.iter().map(|c| c.vertices.len()).sum();
     let of_one =
         (-20..=20).flat_map(|i| (-20..=20).map(move |j| [i, j].map(|n| f64::from(n) * 0.5)));

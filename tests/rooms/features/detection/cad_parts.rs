@@ -208,8 +208,8 @@ fn ee3_has_six_counterbored_and_two_blind_holes() {
 
 /// Seven bodies: the plate, four press-fit studs and two pins. The pictures show 15 holes with
 /// light and six with a stud or pin in them; the plate alone has genus 21. A reader who asks for
-/// the holes of the plate wants all 21, and each goes through, whatever is in it. Circles of the
-/// plate alone, z 63.5 to 73.025.
+/// the holes of the plate wants all 21, and each goes through, with or without a stud. Circles of
+/// the plate alone, z 63.5 to 73.025.
 #[test]
 fn tool_mounting_plate_has_21_holes_with_and_without_studs() {
     let Some(mesh) = part("godel_Tool_Mounting_Plate.STL", Metre) else {

@@ -25,8 +25,7 @@ fn cut_or_raised(features: &[Feature]) -> usize {
 }
 
 /// Rendered from six sides: sharp and smooth edges without an opening, genus 0; a panel with
-/// shallow beads, genus 0; a wrist of which the pictures show only an outline smoothed together,
-/// genus 0.
+/// shallow beads, genus 0; a wrist that appears in the pictures as one smooth outline, genus 0.
 #[test]
 fn parts_without_holes_have_none() {
     for (name, unit) in [

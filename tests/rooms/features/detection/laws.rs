@@ -116,8 +116,8 @@ fn divided(mesh: &TriMesh) -> TriMesh {
     TriMesh::new(positions, faces).unwrap()
 }
 
-/// Dividing the faces of a drawing leaves the part as it is, where circles have many sides: a hole
-/// of twelve flat sides, each of several faces, is not taken for a round one.
+/// Dividing the faces of a drawing keeps its part if circles have many sides: a hole of twelve flat
+/// sides, each of several faces, does not become a round one.
 #[test]
 fn finer_faces_change_nothing() {
     for (name, unit) in FINE {

@@ -114,7 +114,7 @@ fn what_was_not_touched_is_undetermined() {
             fit,
         )
     };
-    // how far the end in a direction along x of F is from the origin of F
+    // distance of the end in a direction along x of F from the origin of F
     let end_std =
         |fit: &Fit<Stadium>, sign: f64| fit.std_by(&[(Freedom::X, sign), (Freedom::Second, 0.5)]);
     for ends in [Ends::Round, Ends::Straight] {

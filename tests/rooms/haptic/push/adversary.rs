@@ -1,4 +1,4 @@
-//! Samples that no careful hand would send. Whatever comes, the mesh stays sound.
+//! Samples that no careful hand would send: the mesh stays sound under all of them.
 
 use std::collections::HashMap;
 

@@ -140,7 +140,7 @@ proptest! {
         let faces: Vec<_> = scan.faces().map(|(_, corners)| corners.map(|v| v.0)).collect();
         let mut here = Refiner::new(scan, params).unwrap();
         let mut away = Refiner::new(TriMesh::new(there, faces).unwrap(), params).unwrap();
-        // off the symmetry lines of the grid, where two faces are equally near
+        // off the symmetry lines of the grid, which have two equally near faces
         let shift = vector![0.137e-3, 0.291e-3, 0.0];
         for sample in raster(8e-3, 2, 0.2, &BALL, |_| 2.0).iter().take(2_000) {
             let pose_ot = Isometry3::from_parts((sample.pose_ot.translation.vector + shift).into(), sample.pose_ot.rotation);
@@ -213,7 +213,7 @@ fn a_hovering_stylus_without_force_changes_nothing_for_ever() {
 // ---- carving
 // ----------------------------------------------------------------------------------------------------
 
-/// How deep the ball is in the mesh, m.
+/// Depth of the ball in the mesh, m.
 fn depth(mesh: &Refiner, centre: &Point3<f64>) -> f64 {
     RADIUS
         - mesh

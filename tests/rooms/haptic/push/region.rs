@@ -1,4 +1,4 @@
-//! Which vertices a push moves, and how they share its displacement.
+//! The vertices that a push moves, and their shares of its displacement.
 
 use std::collections::BTreeSet;
 
@@ -161,7 +161,7 @@ fn one_push(scan: TriMesh, size: RoiSize, at: Point3<f64>) -> (Vec<Vector3<f64>>
     (displacements, update.mismatch.unwrap().face, scan)
 }
 
-/// The displacement of each free vertex is the mean of its neighbours', in whichever mesh.
+/// The displacement of each free vertex is the mean of its neighbours', in any mesh.
 fn check_mean(scan: TriMesh, size: RoiSize, at: Point3<f64>, least_free: usize) {
     let (displacements, handle, scan) = one_push(scan, size, at);
     let longest = displacements

@@ -28,7 +28,7 @@ fn since(before: &RefineCounts, refiner: &Refiner) -> (u64, u64) {
     (now.cut_back - before.cut_back, now.moved - before.moved)
 }
 
-/// Errors after 0, 1, 2, … sweeps, as far as it does not blow up.
+/// Errors after 0, 1, 2, … sweeps, until a blow-up.
 fn sweeps(run: &mut PaperSweeps, count: usize) -> Vec<MeshErrors> {
     let mut errors = vec![run.errors()];
     println!("  sweep  0: {}", errors[0].row());
@@ -103,9 +103,9 @@ const BASIN: [f64; 2] = [
     100.0 / 180.0 * std::f64::consts::PI,
 ];
 
-/// Every scan of a row of seeds, whatever becomes of it. The force on a face is that of its true
-/// plane, so 20 s leave it there if it leaned by less than the basin is wide; a scan converges if
-/// none leans farther when its turn comes, and does not if one leans by more than comes back.
+/// Every scan of a row of seeds, with any end. The force on a face is that of its true plane, so 20
+/// s leave it there if it leaned by less than the width of the basin; a scan converges if none
+/// leans farther at its turn, and does not if one leans beyond return.
 #[test]
 #[ignore = "a slow proof"]
 #[expect(clippy::too_many_lines)]

@@ -1,4 +1,4 @@
-//! How well shaped the faces of a mesh are.
+//! Shape quality of the faces of a mesh.
 
 use nalgebra::Point3;
 use touchup::mesh::TriMesh;

@@ -54,7 +54,7 @@ fn a_generated_column_is_refused_by_its_length() {
     }
 }
 
-/// A message of another topic may be as long as a recorder likes: it is not read.
+/// A message of another topic may have any length: the reader skips it.
 #[test]
 fn a_long_message_of_another_topic_is_passed_over() {
     let folder = tempfile::tempdir().unwrap();

@@ -3,8 +3,8 @@
 use super::*;
 use touchup::mesh::signed_distance;
 
-/// How often a closed mesh winds around `p`: the solid angles of its faces \[Van Oosterom Strackee
-/// 1983\] over 4π.
+/// Winding number of a closed mesh around `p`: the solid angles of its faces \[Van Oosterom
+/// Strackee 1983\] over 4π.
 fn winding(mesh: &TriMesh, p: &Point3<f64>) -> f64 {
     let of_face = |t: Triangle| {
         let [a, b, c] = t.map(|x| x - p);

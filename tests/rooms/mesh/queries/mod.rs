@@ -162,7 +162,7 @@ fn moved(mesh: &TriMesh, scale: f64, shift: Vector3<f64>) -> TriMesh {
     .unwrap()
 }
 
-/// Sizes and places: as it is, far from the origin (m), and tiny.
+/// Sizes and places: unchanged, far from the origin (m), and tiny.
 const PLACES: [(f64, f64); 4] = [(1.0, 0.0), (1.0, 1e6), (0.1, 10.0), (1e-6, 0.0)];
 
 fn any_mesh() -> impl Strategy<Value = (TriMesh, f64, Vector3<f64>, u64)> {

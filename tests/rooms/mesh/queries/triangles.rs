@@ -23,7 +23,7 @@ proptest! {
         }
     }
 
-    /// Corners on a small lattice, where half of all pairs touch, overlap in a plane or share a
+    /// Corners on a small lattice, in which half of all pairs touch, overlap in a plane or share a
     /// point; the expected answer is in exact integers. Parts that do not meet are at least 1e-3
     /// apart there, far more than the gap.
     #[test]

@@ -512,7 +512,7 @@ impl Observer for ForceSeen {
     }
 }
 
-/// An arm whose states somebody changes.
+/// An arm with altered states.
 struct Altered<'a, F: FnMut(&mut ArmState)> {
     arm: SimArm<'a>,
     alter: F,
@@ -588,7 +588,7 @@ fn a_sensor_that_feels_something_is_not_zeroed() {
         matches!(error, ProbeError::Loaded { force_n, most_n: 5.0, .. } if force_n > 6.0),
         "{error}"
     );
-    // somebody leans on it: 20 N/s
+    // a person leans on it: 20 N/s
     let arm = SimArm::new(&plate, params.clone(), &free).unwrap();
     let alter = |state: &mut ArmState| {
         state.wrench_b.force.x += 20.0 * (state.stamp_ns % 1_000_000_000) as f64 * 1e-9
@@ -622,7 +622,7 @@ fn a_sensor_that_feels_something_is_not_zeroed() {
     }
 }
 
-/// Whatever happens in the middle of a search, the arm is at rest within 200 ms, and the reported
+/// After any fault in the middle of a search, the arm is at rest within 200 ms, and the reported
 /// cause is the true one.
 #[test]
 #[expect(clippy::too_many_lines)]
@@ -711,8 +711,8 @@ fn after_each_fault_the_arm_is_at_rest_and_the_reported_reason_is_true() {
     }
 }
 
-/// In the search it is in free air when the sensor fails, 3 mm above the part with 5 mm/s; while it
-/// presses the ball is at the part. The true force says how hard that was.
+/// During a search the sensor fails in free air, 3 mm above the part at 5 mm/s; during a press the
+/// ball is at the part. The true force measures the press.
 #[test]
 fn a_force_sensor_that_does_not_sense_stops_the_arm_within_100_ms() {
     let plate = Plate::default();
@@ -851,7 +851,7 @@ fn a_cancelled_touch_stops() {
     assert!(arm.at_rest_since() - cancelled < 0.1);
 }
 
-/// An arm that never stands still, whatever the command: it creeps by 20 µm from state to state.
+/// An arm that never stands still, under any command: it creeps by 20 µm from state to state.
 struct Creeping {
     stamp_ns: i64,
 }

@@ -1,4 +1,4 @@
-//! Slots whichever way they lie: the pattern that looks for one knows no direction.
+//! Slots in any direction: the pattern that looks for one prefers none.
 
 use nalgebra::{Isometry3, Point3, Rotation3, Unit, UnitQuaternion, Vector3};
 use rand::{RngExt, SeedableRng};

@@ -154,7 +154,7 @@ fn recording_holds(touches: &[TouchLine], stamps: &[i64]) {
     }
 }
 
-/// The features are those of a probing that nobody interrupted: sizes and places agree within three
+/// The features equal those of an uninterrupted probing: sizes and places agree within three
 /// standard deviations of their difference.
 fn found_as_by(whole: &[Value], resumed: &[Value]) {
     assert_eq!(whole.len(), resumed.len());

@@ -399,7 +399,7 @@ fn the_deviation_of_a_touch_is_from_the_mesh_before_it() {
     );
 }
 
-/// Records how fast a probe turns, and how near its shaft comes to the true part.
+/// Records the turning speed of a probe, and the least distance of its shaft from the true part.
 struct Turning {
     scan: StaticScan,
     plate: Plate,
@@ -598,7 +598,7 @@ fn parts() -> Option<Vec<PathBuf>> {
     Some(parts)
 }
 
-/// The part in the size of a hand, whatever its unit is.
+/// The part in the size of a hand, in any unit.
 fn in_reach(mesh: &TriMesh) -> TriMesh {
     let [low, high] = mesh.bounds();
     let scale = 0.12 / (high - low).norm();
@@ -633,7 +633,7 @@ impl Triangles {
         )
     }
 
-    /// Distance of a place, as far as `reach`, m.
+    /// Distance of a place, up to `reach`, m.
     fn distance(&self, p: &Point3<f64>, reach: f64) -> f64 {
         self.0
             .iter()
@@ -709,7 +709,7 @@ fn no_plan_leaves_the_limits_or_passes_through_the_mesh() {
     let mut moves = Moves::default();
     let Some(parts) = parts() else { return };
     for path in parts {
-        // whatever unit it has
+        // in any unit
         let units = [MeshUnit::Millimetre, MeshUnit::Metre, MeshUnit::Inch];
         let read = units.iter().find_map(|unit| read_mesh(&path, *unit).ok());
         let MeshFile { mesh, .. } =
@@ -789,7 +789,7 @@ fn no_plan_leaves_the_limits_or_passes_through_the_mesh() {
                     assert!(is_in, "{}: {kind:?} at {p}", path.display());
                 }
             }
-            // a turn is a move that goes nowhere; with none the shaft is as it was, along z
+            // a turn is a move that goes nowhere; without one the shaft stays along z
             let has_turned = planned.links.iter().any(|[from, to]| from == to);
             let shaft = (!has_turned).then(Vector3::z);
             for pair in &planned.links {

@@ -62,8 +62,8 @@ fn tips(path: &Path) -> Vec<Tip> {
     tips
 }
 
-/// Normal at `at` of the surface through the centres around it, on the side of `force`; `None`
-/// where other passes are too few or all in line.
+/// Normal at `at` of the surface through the centres around it, on the side of `force`; `None` if
+/// other passes are too few or all in line.
 #[expect(clippy::too_many_lines)]
 fn reference(touches: &[TipTouch], at: usize, force: &Vector3<f64>) -> Option<Vector3<f64>> {
     let here = touches[at];

@@ -125,7 +125,7 @@ pub fn in_frame(message: &Message, frame: &str) -> LiveMessage {
     }
 }
 
-/// A pose as somebody at `place` (in O) measures it.
+/// A pose as measured from `place` (in O).
 pub fn seen_from(message: &Message, place: &Isometry3<f64>, frame: &str) -> LiveMessage {
     let Message::Pose(measured) = message else {
         panic!("no pose")
@@ -175,7 +175,7 @@ const STEP: Duration = Duration::from_millis(5);
 const NEVER: Duration = Duration::from_secs(60);
 
 /// A node that runs, and the world around it. Its time stands still but for [`Self::pass`], and
-/// while somebody waits here.
+/// during the waits here.
 pub struct Bench {
     pub node: Node,
     pub world: OtherParticipants,
@@ -331,7 +331,7 @@ impl Bench {
     pub fn diagnostic(&mut self, key: &str) -> Option<String> {
         self.taken();
         self.world.published();
-        // the first may have been on its way already
+        // the first may already be under way
         for _ in 0..2 {
             self.published.clear();
             self.wait_for("diagnostics", |published| {

@@ -404,7 +404,7 @@ fn poses_wait_for_the_transform_of_a_moving_frame_and_not_for_ever() {
     };
     let until = |part: &[Message]| part.iter().map(Message::stamp_ns).max().unwrap();
     for part in waited {
-        // as long as it waits at most
+        // after the longest wait of the node
         give(part);
         bench.taken();
         bench.pass(STALE);
@@ -513,7 +513,7 @@ fn pause_undo_redo_and_reset() {
         read(&end.folder, "refined.ply") == plate.refined("touch.mcap"),
         "as if it were the first session"
     );
-    // with its strokes the first one comes again as it was
+    // with its strokes the first one comes again unchanged
     let report: serde_json::Value = serde_json::from_slice(&read(&first, "report.json")).unwrap();
     assert_eq!(report["paused"], 100);
     let was = read(&first, "refined.ply");
@@ -617,8 +617,7 @@ fn no_more_than_a_few_meshes_are_saved_at_a_time() {
     );
 }
 
-/// The arrow goes from outside onto the place; onto a flag, of which nobody knows more, from the
-/// tip.
+/// The arrow goes from outside onto the place; onto a flag without numbers, from the tip.
 #[test]
 #[ignore = "a slow proof"]
 fn the_tip_shows_where_to_touch_next() {
