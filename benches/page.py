@@ -48,7 +48,7 @@ DEPTH_MM = 0.05
 RATE_HZ, SPEED_MM_PER_S, LINE_MM, WIDTH_MM = 500, 50.0, 0.7, 20.0
 WINDOW = (640, 480)
 
-# each time that the page is about to draw: when, the mesh's version, and how many faces are there
+# at each drawing of the page: the time, the mesh's version, and its number of faces
 WATCH = """
 (() => {
     const seen = { first_ms: null, whole_ms: null, edits: [], blocked: [] };

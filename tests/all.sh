@@ -28,7 +28,7 @@ stages=()
 # note OUTCOME NAME [REASON]: counts a check without a report of its own
 note() { printf '%s\t%s\t%s\n' "$1" "$2" "${3-}" >> "$logs/notes.tsv"; }
 
-# stage NAME COMMAND...: runs it, and notes how long it took
+# stage NAME COMMAND...: runs it, and notes its duration
 stage() {
   local name=$1 begun=$SECONDS; shift
   echo "== $name"

@@ -22,7 +22,7 @@ GOING_S = (1, 8)
 
 
 def processes_of(session):
-    """Those of a session that run: one that a test has stopped stays as it is."""
+    """Running processes of a session, without those that a test has stopped."""
     found = []
     for path in Path("/proc").glob("[0-9]*/stat"):
         try:

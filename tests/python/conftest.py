@@ -30,7 +30,7 @@ def pytest_collection_modifyitems(config, items):
 
 
 def pytest_assertrepr_compare(op, left, right):
-    """Where files differ: pytest would show every line of a difference of a megabyte, which takes half an hour."""
+    """Short report of differing files: pytest would show every line of a difference of a megabyte, which takes half an hour."""
     if op == "==" and isinstance(left, bytes) and isinstance(right, bytes):
         first = next((place for place, (a, b) in enumerate(zip(left, right, strict=False)) if a != b), min(len(left), len(right)))
         part = slice(max(first - 20, 0), first + 20)

@@ -69,7 +69,7 @@ def blocks_of(page):
 
 
 def marks_of(page):
-    """How many marks the page has, wherever they are."""
+    """Number of marks anywhere on the page."""
     return page.read_text(encoding="utf-8").count("<!-- not run")
 
 
@@ -91,7 +91,7 @@ def problem(block):
 
 
 def counts():
-    """How many blocks run, of each kind, and how many not, by reason: a line each."""
+    """Numbers of executed blocks of each kind, and of the others by reason: a line each."""
     blocks = [block for page in PAGES for block in blocks_of(page)]
     kinds = collections.Counter(block.kind for block in blocks if block.is_run)
     reasons = collections.Counter(block.mark for block in blocks if block.mark)

@@ -26,7 +26,7 @@ KNOWN = ["--mesh-unit", "mm", "--tip-radius-mm", str(RADIUS_MM), "--stiffness-n-
 AXIS = np.array([1, 2, 3]) / 14**0.5
 # name: turn about AXIS in degrees, shift in mm
 FRAMES = {"turned": (33, [3.3, 1.7, -2.1]), "shifted": (0, [0.31, 0.17, 0.23]), "elsewhere": (0, [-0.11, 0.44, 0.52])}
-# how late the simulated wrench is, s; how near to the surface a pressed ball is one that touches, mm; the least force, N
+# delay of the simulated wrench, s; largest distance of a touching ball from the surface, mm; its least force, N
 LATE_S, TOUCHING_MM, PRESSED_N = 1.8e-3, 0.2, 0.6
 
 

@@ -16,7 +16,7 @@ MOST = 15
 
 
 def locked(domain):
-    """A lock on it for as long as this process lives; None where another process has it."""
+    """A lock on it for the life of this process; None if another process has it."""
     try:
         lock = open(Path(tempfile.gettempdir()) / f"touchup-dds-domain-{domain}.lock", "w")
     except OSError:

@@ -33,7 +33,7 @@ BINARIES = {
     "/usr/lib/robot_state_publisher/robot_state_publisher": "ros-robot-state-publisher",
 }
 DEADLINE_S = 60
-# of the camera, from top to bottom; Ogre's, which RViz leaves as it is
+# of the camera, from top to bottom; Ogre's default, which RViz keeps
 FIELD_OF_VIEW = numpy.pi / 4
 
 # the plate of the demo, from near

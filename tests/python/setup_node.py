@@ -13,7 +13,7 @@ from web_page import page_url
 
 
 class SetupNode(Process):
-    """`touchup node --web` to which nobody named a scan, with a folder of scans."""
+    """`touchup node --web` without a named scan, with a folder of scans."""
 
     def __init__(self, program, folder, *arguments, ros=()):
         self.scans, self.sessions = folder / "scans", folder / "sessions"

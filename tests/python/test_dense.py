@@ -1,4 +1,4 @@
-"""A scan much finer than the tip, made here of an engraved part: its detail stays where touch agrees, and its lids go.
+"""A scan much finer than the tip, made here of an engraved part: its detail stays in agreement with touch, and its lids go.
 
 The part is a solid of manifold3d, the scan a height field of NumPy with the part's holes and slot closed over, a wide bump, and noise; only
 the touches are touchup's. Distances are libigl's. The picture in docs/dense.png:

@@ -113,7 +113,7 @@ class Page:
 
     def execute(self, place, code):
         if self.interpreter is None:
-            # its errors into a file, as nobody reads them meanwhile
+            # its errors into a file, since no thread reads them meanwhile
             self.errors = open(self.folder / "python.stderr", "w+", encoding="utf-8")
             streams = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": self.errors, "text": True}
             self.interpreter = subprocess.Popen([PYTHON, "-c", INTERPRETER], cwd=self.folder, env=self.environment, **streams)

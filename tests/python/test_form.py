@@ -16,7 +16,7 @@ from touch_groups import groups_of
 
 # axes of both holes of the demo's plate and its height, mm
 THROUGH, BLIND, TOP = np.array([16.0, 36.0]), np.array([32.0, 34.0]), 12.0
-# amplitude of the lobes, mm, and by how much the blind hole leans
+# amplitude of the lobes, mm, and lean of the blind hole
 LOBE, LEAN = 0.025, np.radians(0.1)
 
 

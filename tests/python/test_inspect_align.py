@@ -116,7 +116,7 @@ def test_a_best_fit_and_its_uncertainties_are_those_of_scipy(touchup, tmp_path):
     middle = np.mean([one["center_mm"] for one in features], axis=0)
 
     def equations(twist):
-        """Off their nominal places and directions, each over its standard uncertainty; and how many are of the place."""
+        """Deviations from nominal places and directions, each over its standard uncertainty; and the number of those of the place."""
         turn, all_of = Rotation.from_rotvec(twist[3:]) * MOTION[0], []
         for one, (_, kind, centre, axis, _) in zip(features, PLATE, strict=True):
             place = turn.apply(np.array(one["center_mm"]) - middle) + twist[:3] + MOTION[0].apply(middle) + MOTION[1]

@@ -28,7 +28,7 @@ UNCHANGED_MM = 3**0.5 * 128 * 2**-24
 UNMOVED_MM = 4 * 128 * 2**-52
 # beyond this the judge counts a place as not touched, mm
 FAR_MM = 6
-# both baselines that throw the scan's mesh away, of which the better counts in each column
+# both baselines that throw the scan's mesh away; the better one counts in each column
 OFFLINE = ["poisson", "carve"]
 # permitted factor of a hard case over the baselines on the std one
 HARD = 1.5

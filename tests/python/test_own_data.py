@@ -228,7 +228,7 @@ def test_links_of_unlike_rates_are_interpolated_and_counted(touchup, tmp_path):
     name = "tf2_msgs/msg/TFMessage"
     _, slow, turns, _ = values(len(slow_at), seed=3)
     fast = [(t, messages.of(name, transforms=[messages.transform(t, "arm", "tool0", p, r)])) for t, p, r in zip(stamps, positions, rotations)]
-    # half a period beside the stamps of the others, but for every second one
+    # half a period beside the stamps of the others, except every second one
     slow_stamps = stamps[slow_at] + np.where(np.arange(len(slow_at)) % 2, PERIOD_NS // 2, 0)
     base = [(t, messages.of(name, transforms=[messages.transform(t, "base", "arm", p, r)])) for t, p, r in zip(slow_stamps, slow, turns)]
     stamped = [messages.of("geometry_msgs/msg/WrenchStamped", header=messages.header(t, "tool0"), wrench=messages.wrench(w)) for t, w in zip(stamps, wrenches)]
@@ -327,7 +327,7 @@ def test_a_bag_that_is_cut_anywhere_is_read_up_to_there_or_refused_in_words(touc
 
 
 def test_the_state_of_a_franka_holds_pose_and_wrench(touchup, tmp_path):
-    """By the definition of franka_msgs 0.10 for ROS 1, its numbers drawn at random but for the pose."""
+    """By the definition of franka_msgs 0.10 for ROS 1, with random numbers beside the pose."""
     sizes = {
         "cartesian_collision": 6, "cartesian_contact": 6, "q": 7, "q_d": 7, "dq": 7, "dq_d": 7, "theta": 7, "dtheta": 7,
         "tau_J": 7, "dtau_J": 7, "tau_J_d": 7, "K_F_ext_hat_K": 6, "elbow": 2, "elbow_d": 2, "joint_collision": 7,

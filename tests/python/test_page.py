@@ -31,7 +31,7 @@ def touched(touchup_bin, demo_folder, begun, tmp_path_factory):
     """A node after the beginning of the demo, at rest."""
     folder = tmp_path_factory.mktemp("touched")
     with PageNode(touchup_bin, folder, demo_folder / "scan.ply", "--web-links", ros=CYCLONE) as node:
-        # however busy the machine is, all of it has come
+        # all of it arrives, under any load of the machine
         play_in_step(node, begun, node.domain)
         yield node
 

@@ -89,7 +89,7 @@ def controller():
 
 
 def site_packages(program):
-    """Where `touchup ur setup` puts ur-rtde."""
+    """Folder of ur-rtde after `touchup ur setup`."""
     done = subprocess.run([program, "ur", "setup", ROOT / "target/tmp/ur"], capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr
     return done.stdout.strip().removeprefix("site_packages: ")

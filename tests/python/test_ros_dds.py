@@ -190,7 +190,7 @@ def test_who_comes_late_gets_every_tile(domain):
 
 
 def test_a_service_answers_in_the_mapping_of_cyclone(domain):
-    """However large the answer: the last is in fragments."""
+    """For an answer of any size: the last is in fragments."""
     with Echo(domain, *CYCLONE) as echo:
         undo = Client(echo, Peer(domain), "/touchup/undo", UndoRequest, UndoResponse)
         for strokes in [1, 42, 12_000]:
@@ -219,7 +219,7 @@ def test_parameters_are_read_and_set_and_refused(domain):
 
 
 def test_all_parameters_are_listed_dumped_and_described_whole(domain):
-    """As `ros2 param list`, `dump` and `describe` ask, of all at once, however long the answers are."""
+    """As `ros2 param list`, `dump` and `describe` ask, of all at once, for answers of any length."""
     rows = {code(row["name"])[0]: row for row in table("name", "type", "default")}
     path = "/a/folder/" * 200 + "part.ply"
     with Echo(domain, *CYCLONE, "-p", f"scan:={path}") as echo:

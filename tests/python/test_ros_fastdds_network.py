@@ -37,5 +37,5 @@ def test_the_largest_answers_reach_another_computer(fast_dds, packet):  # noqa: 
             with Echo(domain, wrapper=hub.wrapper("node")) as echo:
                 proof(fast_dds, echo, domain, caller)
     assert hub.passed > 0 and hub.dropped == 0
-    # each answer is one packet, but for the descriptions of all parameters in a tunnel: 1124 bytes, where 1088 have room
+    # each answer is one packet, except the descriptions of all parameters in a tunnel: 1124 bytes, with room for 1088
     assert (hub.parted["node"] > 0) == (packet == TUNNEL)

@@ -45,7 +45,7 @@ def test_the_node_survives_losses_and_a_breakdown_and_reports_them(demo_folder, 
         ) as player:
             node.wait_for(lambda: int(viewer.seen()["values"].get("accepted", 0)) > 5000, 60)
             hub.is_down = True
-            # varies how long it is down
+            # varies its downtime
             time.sleep(DOWN_S)
             hub.is_down = False
             player.wait_for(lambda: player.process.poll() is not None or player.out, 120)

@@ -75,7 +75,7 @@ def let_in(node, role):
     count = len(links(node, role))
     status, headers, _ = ask(node.url, link)
     assert (status, headers["location"]) == (303, "/")
-    # who comes next has another link
+    # the next user has another link
     node.wait_for(lambda: len(links(node, role)) > count)
     cookie = headers["set-cookie"]
     assert "HttpOnly" in cookie and "SameSite=Strict" in cookie
@@ -222,7 +222,7 @@ def test_a_certificate_of_the_user_encrypts_the_page(touchup_bin, demo_folder, t
             page.take_until(lambda: page.faces)
         with pytest.raises(ssl.SSLError):
             ask(node.url, "/", context=ssl.create_default_context())
-        # one that says nothing holds nobody up
+        # a silent one delays no other
         place = urlsplit(node.url)
         with socket.create_connection((place.hostname, place.port)):
             assert ask(node.url, "/", context=trusted)[0] == 200
@@ -290,7 +290,7 @@ def test_pages_have_the_nodes_mesh_however_late_they_join_and_one_that_takes_not
         sigmas = numpy.sqrt([early.variance[vertex] for vertex in touched]) * 1e3
         ratio = sigmas / numpy.array(list(sigma_of.values()))[at]
         assert far.max() < 1e-3 and len(touched) > 1000 and numpy.abs(ratio - 1).max() < 1e-3
-        # deviations are those that libigl finds from the part as it is
+        # deviations equal libigl's from the unchanged part
         truth = trimesh.load(demo_folder / "truth.ply", process=False)
         measured = {vertex: far for vertex, far in early.numbers_of[DEVIATION].items() if vertex in early.vertices}
         assert measured.keys() == early.vertices.keys()

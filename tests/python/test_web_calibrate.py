@@ -214,7 +214,7 @@ def test_by_clicks_into_the_scene(browser, touchup_bin, demo_folder, scans, tmp_
         else:
             card.get_by_role("button", name=re.compile("swing")).click()
         card.get_by_text(swung).wait_for()
-        # the offset as it is, with the sign and the decimal point of the language
+        # the unchanged offset, with the sign and the decimal point of the language
         shown = card.locator("dl").inner_text().replace("−", "-").replace(",", ".")
         (z,) = re.findall(r"(-14\d\.\d+)\s±", shown)
         assert abs(float(z) - OFFSET_MM[2]) < 0.01, shown

@@ -84,7 +84,7 @@ def sampled_ns(page):
 
 
 def rest(page, for_s=2):
-    """Takes messages up until the mesh has stayed as it is for a while."""
+    """Takes messages up until the mesh has stayed unchanged for a while."""
     version, since = page.version, time.monotonic()
     while time.monotonic() - since < for_s:
         page.take()
@@ -271,7 +271,7 @@ def test_it_plays_pauses_and_goes_back_by_beginning_again(node):
         assert 17.9 <= page.state["at_s"] <= 18.1 and page.state["is_paused"] and page.session == "one#1"
         rest(page)
         late = len(touched_places(page))
-        # who looks at the same session sees the same place
+        # another page of the same session sees the same place
         with ReplaySocket(node, "one") as other:
             page.set(at_s=6)
             take_until([page, other], lambda: page.session == "one#2" and page.state["target_s"] is None and page.state["at_s"] >= 5.9)

@@ -1,4 +1,4 @@
-"""The inspection report that an operator's page makes of a session: of which numbers it is, and who may have one."""
+"""The inspection report that an operator page makes of a session: its numbers, and the permission for it."""
 
 import csv
 import http.client

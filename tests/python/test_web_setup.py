@@ -83,7 +83,7 @@ def test_the_scene_of_the_folder_is_begun_with_and_keeps_its_comments(touchup_bi
         with Socket(node.url) as page:
             page.take_until(lambda: page.faces)
             places = numpy.array(list(page.vertices.values()))
-            # in m, whatever the file has
+            # in m, for any unit of the file
             assert numpy.allclose(places.max(0) - places.min(0), units["inch"]["sides_m"], atol=1e-6)
     scene = (scans / "scene.yaml").read_text()
     assert scene.startswith("# bench 3\n") and "# the long one" in scene and "contact: { on_n: 0.4 }" in scene
@@ -244,7 +244,7 @@ def test_a_recording_of_the_folder_is_looked_at(empty, demo_folder):
     assert empty.ask("/api/setup/check", {"recording": "noise.mcap"})[0] == 200
     empty.wait_for(lambda: empty.state()["check"]["state"] == "refused")
     assert "noise.mcap" in empty.state()["check"]["why"]
-    # nobody has to look
+    # the check is optional
     assert empty.ask("/api/setup/check", {})[1]["is_check_over"]
     assert empty.ask("/api/setup/start", {})[0] == 200
 

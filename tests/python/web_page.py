@@ -87,7 +87,7 @@ class Socket:
             self.answers[message["id"]] = message
 
     def take_numbers(self, message):
-        """A number for each of some vertices, little endian: 2, which, two zeros, how many, vertices (u32), numbers (f32)."""
+        """A number for each of some vertices, little endian: 2, which, two zeros, their count, vertices (u32), numbers (f32)."""
         assert message[0] == 2 and message[2:4] == bytes(2)
         (count,) = struct.unpack_from("<I", message, 4)
         assert len(message) == 8 + 8 * count

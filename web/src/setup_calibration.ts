@@ -106,7 +106,7 @@ export class CalibrationCard {
 
   private showLists({ recordings, tables, folder }: SetupState, own: OwnChoice, mayChange: boolean): void {
     if (!tables.some(({ name }) => name === this.points)) this.points = null;
-    // the same lists again touch nothing, so that who is on a button stays there
+    // the same lists again touch nothing, so that a focused button keeps the focus
     const lists = JSON.stringify([recordings, this.needsPoints ? tables : [], locale()]);
     if (lists !== this.drawn.lists) {
       this.drawn.lists = lists;

@@ -58,7 +58,7 @@ export class CheckStep extends SetupStep {
     if (check.state === "refused") write(this.status, refusalWords(check.file, check.why));
     say(this.overWords, check.state === "found" ? "checkOver" : "checkWithout");
     this.over.disabled = !mayChange;
-    // the same again touches nothing, so that who is on a button stays there
+    // the same again touches nothing, so that a focused button keeps the focus
     const drawn = JSON.stringify([recordings, check, t("checkTitle")]);
     if (drawn !== this.drawn) {
       this.drawn = drawn;

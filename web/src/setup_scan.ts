@@ -51,7 +51,7 @@ export class ScanStep extends SetupStep {
     write(this.kinds, t("scanKinds", { size: bytes(largest_upload) }));
     const isBusy = scan.state === "reading" || state.upload !== null || this.sent !== null;
     const mayChange = this.desk.mayChange && !isBusy;
-    // the same list again touches nothing, so that who is on it stays there
+    // the same list again touches nothing, so that a focused button keeps the focus
     const drawn = JSON.stringify([files, locale()]);
     if (drawn !== this.shown) {
       this.shown = drawn;

@@ -45,7 +45,7 @@ def at_once(push, given):
 
 
 def pairs(mesh, samples, scene):
-    """By how much `push_many` takes longer than the loop of Rust, %, with the standard error of that."""
+    """Excess time of `push_many` over the loop of Rust, %, with its standard error."""
     arrays, ratios = samples._arrays(), []
     for at in range(PAIRS):
         rust, many = touchup.Refiner(mesh, scene), touchup.Refiner(mesh, scene)

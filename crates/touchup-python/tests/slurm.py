@@ -52,7 +52,7 @@ class Slurm:
         self.environment = {**os.environ, "SLURM_CONF": str(folder / "slurm.conf")}
 
     def __enter__(self):
-        # the key of munge is nobody's else, and its folder neither
+        # the key of munge and its folder belong to its user alone
         self.folder.chmod(0o755)
         for name in ("state", "spool"):
             (self.folder / name).mkdir()

@@ -1,4 +1,4 @@
-"""A sweep on Ray: the same bytes as one job after the other, whatever becomes of its workers."""
+"""A sweep on Ray: the same bytes as one job after the other, for any end of its workers."""
 
 import os
 import signal

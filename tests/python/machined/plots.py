@@ -17,7 +17,7 @@ matplotlib.use("Agg")
 from matplotlib import pyplot  # noqa: E402
 
 KINDS = ["hole", "slot", "pocket", "boss", "notch"]
-# told apart by those who do not see red or green, and by their brightness
+# distinct without red or green, and by their brightness
 COLOURS = ["#0072b2", "#e69f00", "#56b4e9", "#009e73", "#555555"]
 FOUND, FALSE, RATIO = 0.97, 0.01, (0.8, 1.25)
 

@@ -27,7 +27,7 @@ from scipy.interpolate import RBFInterpolator
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-# voxels of the implicit surfaces, and how far from contacts they go, mm
+# voxels of the implicit surfaces, and their largest distance from contacts, mm
 VOXEL_MM = 0.35
 BAND_MM = 1.6
 # spacing of the contacts for the other methods, mm
@@ -36,8 +36,8 @@ THIN_MM = 0.3
 REPLACED_MM = 1.5
 # behind a contact there is material over this, mm
 BEHIND_MM = 1.0
-# length of the kernel, mm; the noise of an observation is this share of its amplitude; observations around a voxel, thinned to this, and how far
-# off the surface those are that no ball gives, mm
+# length of the kernel, mm; the noise of an observation is this share of its amplitude; number of observations around a voxel, and their
+# spacing, mm; distance off the surface of those without a ball, mm
 LENGTH_MM = 2.0
 NOISE = 0.03
 NEIGHBOURS = 40
@@ -195,7 +195,7 @@ def compared(folder):
 
 
 def table(results):
-    """Lines of both errors by part, and where touchup is not the best."""
+    """Lines of both errors by part, and the parts on which touchup is not the best."""
     names = list(next(iter(results.values())))
     lines = [f"{'t2m / m2t, mm':34}" + "".join(f"{name:>18}" for name in names)]
     for part, of in results.items():
