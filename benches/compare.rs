@@ -19,7 +19,7 @@ fn main() {
     divan::main();
 }
 
-/// The vertices of a wavy plate of about `count`, noisy, in an order without rhyme.
+/// The vertices of a wavy plate of about `count`, noisy, in a random order.
 fn points(count: usize) -> Vec<Point3<f64>> {
     let mut rng = Pcg64::new(1, 1);
     let mesh = wavy::wavy_plate(2 * count).expect("it can be counted");

@@ -22,7 +22,7 @@ fn main() {
 /// Divisions of each face into four: 72,000 and 1,150,000 vertices.
 const DIVISIONS: [u32; 2] = [1, 3];
 
-/// The demo's plate by a scanner that is good: 5 µm of noise, edges rounded by 20 µm.
+/// The demo's plate by a good scanner: 5 µm of noise, edges rounded by 20 µm.
 fn fine_scan(divisions: u32) -> TriMesh {
     let params = ScannerParams {
         edge: 620e-6,

@@ -76,7 +76,7 @@ type TimesOf = fn(&Second) -> Option<Times>;
 
 /// The run, second by second.
 ///
-/// - `memory`: of the node, MB, with the time at which it was that, ns since 1970.
+/// - `memory`: of the node, MB, each value with its time, ns since 1970.
 fn seconds(answers: &Answers, drawn: &Drawn, memory: &[(i64, f64)]) -> Vec<Second> {
     let first = answers.begin_ns / 1_000_000_000;
     let second = |(&(unanswered, answer), at): (&(u64, Option<Times>), i64)| {
@@ -100,7 +100,7 @@ fn seconds(answers: &Answers, drawn: &Drawn, memory: &[(i64, f64)]) -> Vec<Secon
 
 /// Writes plots and table into `folder`.
 ///
-/// - `memory`: of the node, MB, with the time at which it was that, ns since 1970.
+/// - `memory`: of the node, MB, each value with its time, ns since 1970.
 pub fn write(folder: &Path, faces: usize, answers: &Answers, drawn: &Drawn, memory: &[(i64, f64)]) {
     let seconds = seconds(answers, drawn, memory);
     let (figures, tables) = (

@@ -168,7 +168,7 @@ fn main() -> anyhow::Result<()> {
         let period = Duration::from_secs_f64(PERIOD);
         let mut last = Instant::now();
         loop {
-            // a machine that was late is late for good: a period is never made up for
+            // a late machine stays late: the clock never makes up for a period
             thread::sleep(
                 (last + period)
                     .saturating_duration_since(Instant::now())

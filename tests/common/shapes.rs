@@ -9,7 +9,7 @@ use touchup::mesh::TriMesh;
 mod subdivided;
 pub use subdivided::subdivided;
 
-/// The icosahedron with its edges halved so often, on a sphere.
+/// The icosahedron with its edges halved `halvings` times, on a sphere.
 pub fn icosphere(radius: f64, halvings: u32) -> TriMesh {
     let golden = (1.0 + 5f64.sqrt()) / 2.0;
     let corners = (0..12).map(|i| {

@@ -79,7 +79,6 @@ fn help_is_a_result() {
 }
 
 // ---- refine
-// -----------------------------------------------------------------------------------------------------
 
 /// Half the width of the scan of [`Case`], mm.
 const HALF: i32 = 10;
@@ -996,7 +995,6 @@ fn a_recording_that_moves_nothing_reports_the_reason() {
 }
 
 // ---- demo
-// -------------------------------------------------------------------------------------------------------
 
 #[test]
 #[ignore = "a slow proof"]
@@ -1111,7 +1109,6 @@ fn a_scene_without_an_end_is_refused_before_it_is_all_in_memory() {
 }
 
 // ---- init
-// -------------------------------------------------------------------------------------------------------
 
 /// `refine` takes a scene of `init` unchanged, and each of its sources is the scene.
 #[test]
@@ -1181,7 +1178,6 @@ fn init_writes_a_scene_that_refine_takes() {
 }
 
 // ---- simulate
-// ---------------------------------------------------------------------------------------------------
 
 /// The markers on the stylus in place of its pose, with occlusion, swaps and outliers, lower the
 /// error as poses do.
@@ -1376,7 +1372,6 @@ fn simulate_makes_the_input_of_refine() {
 }
 
 // ---- step
-// -------------------------------------------------------------------------------------------------------
 
 /// A linear spring at rest under no force: h = 0 stays 0 for any other numbers.
 #[test]
@@ -1398,7 +1393,6 @@ fn step_answers_each_line_in_order_and_goes_on_after_a_bad_one() {
 }
 
 // ---- report
-// -----------------------------------------------------------------------------------------------------
 
 /// The program in a folder of its own, with a script beside it in place of `touchup-report`.
 #[test]
@@ -1473,7 +1467,6 @@ fn the_version_names_the_commit() {
 }
 
 // ---- stdout that takes nothing
-// ------------------------------------------------------------------------------------
 
 /// A result that did not reach stdout does not exist: exit 1 for any verb.
 #[test]

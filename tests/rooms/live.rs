@@ -464,7 +464,7 @@ fn a_late_patch_holds_no_sample_up_and_changes_nothing_of_the_result() {
         }
         kept.push(sample);
     }
-    // the first permit lets the renewal through that is due since 18 ms after the first sample at
+    // the first permit lets through the renewal that is due since 18 ms after the first sample at
     // most, and so on
     let renewals = permits as u64;
     assert!(renewals > 50);

@@ -667,7 +667,6 @@ fn bias_tracking_is_built_only_when_named_and_not_in_the_paper() {
 }
 
 // ---- settings put into the text
-// ---------------------------------------------------------------------------------
 
 /// A scene in a user's writing, with the values of each calibration.
 fn calibrated(yaml: &str) -> Result<String, SceneError> {

@@ -133,7 +133,6 @@ fn names_in(folder: &Path) -> Vec<String> {
 const ONE_JOB: &str = "keys: { tip.radius_mm: 1.5 }\n";
 
 // ---- plan
-// -------------------------------------------------------------------------------------------------------
 
 #[test]
 fn a_plan_has_every_setting_with_every_recording_in_the_order_of_the_alphabet() {
@@ -278,7 +277,6 @@ fn a_misspelt_key_is_refused_with_its_line_and_the_key_that_is_meant() {
 }
 
 // ---- run
-// --------------------------------------------------------------------------------------------------------
 
 #[test]
 fn a_result_has_the_same_bytes_wherever_and_under_whatever_names_it_is_made() {
@@ -509,7 +507,6 @@ fn a_file_that_is_not_what_was_planned_is_refused_and_nothing_is_written() {
 }
 
 // ---- table
-// ------------------------------------------------------------------------------------------------------
 
 /// The touch presses with 2 N: a threshold of 3 N sees no contact, which refine refuses.
 #[test]
@@ -709,7 +706,6 @@ fn a_damaged_result_names_its_job_and_how_it_is_made_anew_and_others_go_on() {
 }
 
 // ---- whatif
-// -----------------------------------------------------------------------------------------------------
 
 /// A result as a job leaves it: a sheet of 21 × 21 vertices that rises by `step` mm from column to
 /// column, known to `sigma` mm.
@@ -986,7 +982,6 @@ fn the_plate_touched_by_a_softer_stylus_grows_everywhere_by_its_bending() {
 }
 
 // ---- simulated
-// --------------------------------------------------------------------------------------------------
 
 /// The scan of `touchup demo` with the same seed, byte for byte.
 #[test]

@@ -36,7 +36,7 @@ pub struct Constant {
     pub value: String,
     /// of its own; empty if it has none
     pub comment: String,
-    /// index of the field below it, which it is a value of
+    /// index of the field below it, which has this value
     pub of: usize,
 }
 

@@ -114,7 +114,7 @@ pub struct Controller<'a> {
     heard_at: f64,
     /// one has come since the last period
     is_heard: bool,
-    /// looks at the clock since the last period, for want of a word of the client
+    /// refused requests of a silent client for a period since the last one
     quiet_looks: u32,
     /// time until which the clock runs unconditionally, s
     granted_until: f64,

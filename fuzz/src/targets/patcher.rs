@@ -1,4 +1,4 @@
-//! Any samples on a closed scan: its patch has places alone, and leaves it closed.
+//! Any samples on a closed scan: its patch has finite places, and leaves it closed.
 
 use crate::{BALL, assert_is_somewhere, closed_box, open_edges, sample};
 use arbitrary::{Result, Unstructured};

@@ -1,4 +1,4 @@
-//! Any samples pushed into a mesh with any vertices: every vertex stays at a place.
+//! Any samples pushed into a mesh with any vertices: every vertex keeps finite coordinates.
 
 use crate::{BALL, assert_is_somewhere, closed_box, sample, vector};
 use arbitrary::{Result, Unstructured};

@@ -549,7 +549,6 @@ fn a_flange_with_more_than_its_middle_hole_is_not_free() {
 }
 
 // ---- at the boundary of the process
-// -------------------------------------------------------------------------------
 
 fn touchup(arguments: &[&str]) -> std::process::Output {
     let program = env!("CARGO_BIN_EXE_touchup-tested");

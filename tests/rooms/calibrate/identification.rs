@@ -26,7 +26,6 @@ fn any_turn(rng: &mut Pcg64Mcg) -> UnitQuaternion<f64> {
 }
 
 // ---- payload
-// ----------------------------------------------------------------------------------------------------
 
 const WEIGHT: Vector3<f64> = Vector3::new(0.4, -0.7, -3.9);
 const CENTRE: Vector3<f64> = Vector3::new(0.004, -0.011, 0.052);
@@ -286,8 +285,8 @@ fn static_segments_of_a_recording_are_found() {
     }
 }
 
-/// Rows of numbers of a text file, below `../shared/data/force/gravity_ati`; `None`, said aloud,
-/// when that is not there.
+/// Rows of numbers of a text file, below `../shared/data/force/gravity_ati`; `None`, with
+/// a message, if it is absent.
 fn real(name: &str) -> Option<Vec<Vec<f64>>> {
     let text =
         fs::read_to_string(crate::shared::shared(&format!("force/gravity_ati/{name}"))?).unwrap();
@@ -418,13 +417,12 @@ fn a_real_stream_gives_the_same_payload_within_its_settling() {
 }
 
 // ---- tip
-// --------------------------------------------------------------------------------------------------------
 
 const OFFSET: Vector3<f64> = Vector3::new(0.0021, -0.0013, -0.1418);
 const REST: Vector3<f64> = Vector3::new(0.31, 0.12, 0.05);
 
 /// A swing about the ball: to `tilt` rad about x and `share` of that about y, with white noise or
-/// noise that goes on.
+/// correlated noise.
 fn swing(
     count: u32,
     tilt: f64,
@@ -526,7 +524,7 @@ fn swings_that_do_not_determine_the_tip_are_refused() {
         fitted(&swing(5, 0.5, 1.0, 0.0, 0.0, 0)),
         TipError::TooFew { count: 5 }
     );
-    // about one axis (x, turned by 0.3 rad about z): the offset along it is anything
+    // about one axis (x, turned by 0.3 rad about z): the offset along it is arbitrary
     let hinge: Vec<_> = (0..500)
         .map(|i| {
             let turn = UnitQuaternion::from_scaled_axis(Vector3::x() * (f64::from(i) / 80.0).sin());

@@ -14,7 +14,7 @@ use touchup::sim::{
 };
 use touchup::stylus::Message;
 
-/// A scanner of the better kind; it still closes holes, rounds edges, is too large and displaced.
+/// A good scanner; it still closes holes, rounds edges, is too large and displaced.
 fn scanner(seed: u64) -> ScannerParams {
     let closes = 6e-3;
     ScannerParams {

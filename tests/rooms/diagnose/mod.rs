@@ -191,7 +191,7 @@ fn recorded(seconds: f64, at: impl Fn(f64) -> (Isometry3<f64>, Vector3<f64>)) ->
     let of = |ms: i64| {
         let stamp_ns = ms * 1_000_000;
         let (pose_ot, force) = at(ms as f64 * 1e-3);
-        // a noise that repeats itself after longer than anything lasts
+        // pseudo-random noise with a period longer than any recording
         let noise =
             Vector3::new(0.9, 1.7, 2.3).map(|turn| 0.01 * (turn * (ms * ms % 9973) as f64).sin());
         let wrench = Wrench {

@@ -76,7 +76,6 @@ fn number(summary: &Value, key: &str) -> u64 {
 }
 
 // ---- a real recording
-// -------------------------------------------------------------------------------------------
 
 /// Radius of the ball of the real recording, m.
 const PROBE_RADIUS: f64 = 3.15e-3;
@@ -259,7 +258,6 @@ fn a_real_recording_shapes_a_flat_patch_the_same_from_both_containers() {
 }
 
 // ---- a made plate
-// -----------------------------------------------------------------------------------------------
 
 /// A noisy plate in mm, and a ball of 1.5 mm that slides over the true plane.
 struct Plate {
@@ -563,7 +561,6 @@ fn other_parameters_give_another_mesh() {
 }
 
 // ---- damage
-// -----------------------------------------------------------------------------------------------------
 
 /// Permitted outcomes of any run: finish, with a whole mesh; or refuse with one line, and leave no
 /// file.

@@ -8,7 +8,7 @@ pub struct Bound {
 }
 
 impl Bound {
-    /// Nothing while the bound holds and is not stale.
+    /// Complaint about a broken or stale bound.
     pub fn complaint(&self, count: usize) -> Option<String> {
         let Self { today, wanted } = *self;
         let reached = count.max(wanted);

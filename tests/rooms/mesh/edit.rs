@@ -1,4 +1,4 @@
-//! A mesh and its tree while faces come and go: against brute force, and for long.
+//! A mesh and its tree while faces come and go: against brute force, and over long sessions.
 
 use std::collections::BTreeMap;
 
@@ -13,7 +13,6 @@ use touchup::mesh::{
 use crate::common::{grid, within};
 
 // ---- expected content of the mesh
-// ----------------------------------------------------------------------------------
 
 /// The same mesh as plain lists, edited beside the one under test.
 #[derive(Default)]
@@ -87,7 +86,6 @@ impl Ledger {
 }
 
 // ---- the mesh alone
-// ---------------------------------------------------------------------------------------------
 
 /// Splits a face in three about a new vertex, or takes out a vertex with its faces and closes the
 /// gap as a fan.
@@ -171,7 +169,6 @@ fn a_million_replacements_leave_storage_bounded_and_stars_exact() {
 }
 
 // ---- the tree
-// ---------------------------------------------------------------------------------------------------
 
 /// Squared distance from `p` to each face, by the closest point of one triangle (which has tests of
 /// its own).

@@ -122,7 +122,6 @@ fn turn() -> UnitQuaternion<f64> {
 }
 
 // ---- known surfaces
-// ---------------------------------------------------------------------------------------------
 
 #[test]
 fn a_sphere_is_a_sphere() {
@@ -263,7 +262,6 @@ fn random_waves_give_closed_skins_without_intersections() {
 }
 
 // ---- in a scan
-// --------------------------------------------------------------------------------------------------
 
 /// Cells that come within `radius` of one of `points`, none within `margin` of a rim of the scan.
 fn region_around(

@@ -79,7 +79,6 @@ fn default_synchronised(messages: &[Message]) -> (Vec<Sample>, SyncCounts) {
 }
 
 // ---- interpolation
-// ----------------------------------------------------------------------------------------------
 
 #[test]
 fn position_between_two_poses_is_the_straight_line() {
@@ -166,7 +165,6 @@ proptest! {
 }
 
 // ---- which samples come out
-// -------------------------------------------------------------------------------------
 
 #[test]
 fn a_sample_goes_out_once_no_message_in_the_window_can_change_it() {
@@ -508,7 +506,6 @@ proptest! {
 }
 
 // ---- samples
-// ----------------------------------------------------------------------------------------------------
 
 #[test]
 fn a_sample_is_refused_when_not_finite_or_not_in_order() {
@@ -564,7 +561,6 @@ fn a_sample_is_refused_when_not_finite_or_not_in_order() {
 }
 
 // ---- compensation
-// -----------------------------------------------------------------------------------------------
 
 /// Rotation matrix about `axis` by `angle`, written out by hand (Rodrigues).
 fn rodrigues(axis: Vector3<f64>, angle: f64) -> Matrix3<f64> {
@@ -799,7 +795,6 @@ fn a_real_sensor_at_rest_measures_nothing() {
 }
 
 // ---- contact gate
-// -----------------------------------------------------------------------------------------------
 
 #[test]
 fn the_gate_holds_between_its_thresholds_and_remembers_the_onset() {

@@ -1,4 +1,4 @@
-//! The files of a report: well formed, without a number that is none, and with every digit in the
+//! The files of a report: well formed, without invalid numbers, and with every digit in the
 //! CSV.
 
 use serde_json::Value;

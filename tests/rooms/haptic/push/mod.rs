@@ -211,7 +211,6 @@ fn a_hovering_stylus_without_force_changes_nothing_for_ever() {
 }
 
 // ---- carving
-// ----------------------------------------------------------------------------------------------------
 
 /// Depth of the ball in the mesh, m.
 fn depth(mesh: &Refiner, centre: &Point3<f64>) -> f64 {

@@ -33,7 +33,7 @@ fn bad_after(tick: i64) -> Vec<Sample> {
         .coords
         .fill(0.0);
     bad.push(no_rotation);
-    // repeated, backward, and as far back as there is
+    // repeated, backward, and the earliest of all
     bad.extend(
         [tick, tick - 1, tick - 1000, i64::MIN / TICK_NS].map(|at| Sample {
             stamp_ns: at * TICK_NS,

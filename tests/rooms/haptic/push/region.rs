@@ -254,8 +254,8 @@ fn the_handle_rises_to_the_ball() {
     );
 }
 
-/// Scans as they come: a face that is there twice, three faces at an edge, a rim, a face without
-/// area, a lone one.
+/// Degenerate scans: a repeated face, three faces at an edge, a rim, a face without area, a lone
+/// one.
 #[test]
 fn scans_that_are_no_surfaces_are_refined_all_the_same() {
     let sound = bumpy(6);

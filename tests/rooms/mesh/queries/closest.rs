@@ -233,7 +233,6 @@ fn twenty_thousand_faces_after_five_thousand_edits() {
 }
 
 // ---- inside and outside
-// -----------------------------------------------------------------------------------------
 
 /// A prism over the polygon `outline` (convex, counter-clockwise seen from above) from z = −1 to z
 /// = 1, normals outside.

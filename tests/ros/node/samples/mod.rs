@@ -584,7 +584,7 @@ fn a_mesh_is_saved_into_the_folder_of_the_session_and_nowhere_else() {
     assert!(read(&end.folder, "part.ply") == read(&end.folder, "refined.ply"));
 }
 
-/// Each save has a copy of all touches: a caller that is in a hurry gets an answer, not the memory.
+/// Each save has a copy of all touches: a caller in a hurry gets an answer, not the memory.
 #[test]
 fn no_more_than_a_few_meshes_are_saved_at_a_time() {
     let plate = Plate::touched(0.1);
