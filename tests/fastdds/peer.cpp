@@ -1,4 +1,4 @@
-// A ROS 2 node as rmw_fastrtps puts it on the wire, by Fast DDS alone: messages are passed through as bytes.
+// A ROS 2 node as rmw_fastrtps puts it on the wire, by Fast DDS alone: it passes messages through as bytes.
 //
 //   peer tiles DOMAIN COUNT          listens to rt/mesh as a late joiner until COUNT different tiles have come
 //   peer echo DOMAIN COUNT           sends COUNT wrenches, up to 32 ahead of the mismatches that come back, and times those
@@ -6,7 +6,7 @@
 //   peer call DOMAIN SERVICE TYPE    sends each line of standard input, hexadecimal, as a request; "answer HEXADECIMAL" comes back
 //
 // Writes "matched" once its readers and writers have met those of others; echo and call go on with the next line of standard input,
-// as the others may know nothing of it yet. Ends with 0, listen and call at the end of standard input; with 1 after words of what is wrong.
+// as the others may know nothing of it yet. Ends with 0, listen and call at the end of standard input; with 1 after an error message.
 
 #include <algorithm>
 #include <chrono>
@@ -39,10 +39,10 @@ using eprosima::fastrtps::rtps::SerializedPayload_t;
 using eprosima::fastrtps::rtps::WriteParams;
 using Clock = std::chrono::steady_clock;
 
-// what comes is asked for, not when: a machine that is busy may take its time; tests wait for 120 s
+// a busy machine may take its time with arrivals; tests wait for 120 s
 constexpr std::chrono::seconds PATIENCE{100};
 
-// a message as it is on the wire, four bytes of encapsulation first
+// a message on the wire, four bytes of encapsulation first
 using Bytes = std::vector<uint8_t>;
 
 struct Raw : TopicDataType {
@@ -90,7 +90,7 @@ struct Cdr {
   }
 };
 
-// how many endpoints of others have been met
+// number of matched endpoints of others
 struct Met {
   std::mutex mutex;
   std::condition_variable more;
@@ -265,7 +265,7 @@ int listen(int domain, const char* topic, const char* type) {
   std::quick_exit(0);
 }
 
-// when each of the messages came back
+// time of the return of each message
 struct Times : ReaderListener {
   std::mutex mutex;
   std::condition_variable more;
