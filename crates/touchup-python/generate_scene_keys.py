@@ -1,4 +1,4 @@
-"""Writes python/touchup/_scene_keys.py from what the installed wheel declares of the scene.
+"""Writes python/touchup/_scene_keys.py from the scene keys that the installed wheel declares.
 
     python crates/touchup-python/generate_scene_keys.py [-]
 """
@@ -73,7 +73,7 @@ def classes(key: dict) -> list[str]:
 
 def text() -> str:
     sections = json.loads(scene_parameters())
-    summary = "What differs from the usual cell; a part that is False or \"off\" is not built."
+    summary = "Differences from the default scene; False or \"off\" leaves out a part."
     all_classes = [text for section in sections for text in classes(section)] + [class_of("Scene", summary, sections)]
     return HEAD + "\n" + "\n\n".join(all_classes)
 

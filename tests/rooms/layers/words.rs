@@ -21,7 +21,7 @@ const PASSIVES: Bound = Bound {
     wanted: 60,
 };
 const UNFINISHED: Bound = Bound {
-    today: 1,
+    today: 0,
     wanted: 0,
 };
 

@@ -17,24 +17,26 @@ parameters! {
     /// Limits that keep a mesh sound.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct GuardParams in "guard" {
-        /// Smallest twice area over longest edge squared: 0.15 is a triangle stretched sixfold; of
-        /// a triangle that was scanned thin nine tenths of what it had.
+        /// Smallest quality of a triangle, twice its area over its longest edge squared: 0.15 is a
+        /// sixfold stretch. For a thin triangle of the scan, nine tenths of its scanned quality if
+        /// that is less.
         ///
         /// [`Self::SCANNED_SHARE`] of the scanned value, if less: it must not hold all around it.
         smallest_quality: f64 = 0.15, "smallest_quality" [ONE, 0, 0.87];
-        /// Smallest cosine between normals before and after one update.
+        /// Smallest cosine between the normals of a face before and after one update.
         ///
         /// 0.5 is 60°.
         smallest_turn_cosine: f64 = 0.5, "smallest_turn_cosine" [ONE, -1, 1];
-        /// Smallest cosine between a normal and the last that was scanned or measured there.
+        /// Smallest cosine between the normal of a face and its last scanned or measured normal.
         ///
         /// At 0 a lid may become a wall, but not an overhang.
         smallest_evidence_cosine: f64 = 0.0, "smallest_evidence_cosine" [ONE, -1, 1];
-        /// Smallest cosine between neighbours: -0.85 is 148 degrees apart.
+        /// Smallest cosine between the normals of neighbouring faces: -0.85 is an angle of 148
+        /// degrees.
         ///
         /// That is a knife's edge, beyond it is a fold.
         smallest_fold_cosine: f64 = -0.85, "smallest_fold_cosine" [ONE, -1, 1];
-        /// Faces nearer than this many mean edges count as touching.
+        /// Distance in mean edge lengths below which faces count as touching.
         gap_share: f64 = 0.01, "gap_edges" [EDGES, 0, 1];
     }
 }

@@ -35,16 +35,15 @@ parameters! {
     /// Carving: removes surface that the ball passes through without a force (case 2).
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct CarveParams in "carve" {
-        /// Share of the depth that goes in a second.
+        /// Share of the depth removed per second.
         ///
         /// In 1/s. The swept volume is certainly free, and soon cleared.
         rate: f64 = 300.0, "rate_per_s" [PER_S, 0, 1e6];
-        /// Depth that is left alone: the noise of the tracking.
+        /// Depth that carving leaves alone: the noise of the tracking.
         ///
         /// In m.
         tolerance: f64 = 0.05, "tolerance_mm" [MM, 0, 1000];
-        /// While in contact only what is deeper than this is taken away: what is shallower may be
-        /// the measured surface itself.
+        /// Depth that carving leaves alone during contact, because it may be the measured surface.
         ///
         /// In m.
         contact_tolerance: f64 = 0.2, "contact_tolerance_mm" [MM, 0, 1000];

@@ -13,12 +13,12 @@ parameters! {
     /// Settings of a [`BiasTracker`].
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct BiasParams in "bias_tracking" {
-        /// It is free air once the motion has been free for this time (contact.free_n); what was
-        /// learnt in this time before a contact is dropped.
+        /// Time of free motion (contact.free_n) before the tracking begins; a contact discards the
+        /// drift tracked in this time before it.
         ///
         /// In ns. A hand rises to 0.3 N and falls from it within 10 ms.
         settle_ns: i64 = 60.0, "settle_ms" [MS, 0.001, 60000];
-        /// Time constant of the running mean.
+        /// Time constant of the running mean of the bias.
         ///
         /// In s. A noise of 0.05 N at 1 kHz becomes 2 mN; the bias lags a drift of 10 mN/s by 3 mN.
         time: f64 = 0.3, "time_s" [S, 1e-6, 1e6];

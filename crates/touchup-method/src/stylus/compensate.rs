@@ -26,15 +26,15 @@ parameters! {
     /// The payload beyond the measuring plane of the sensor.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct Payload in "compensation.payload" {
-        /// Its mass.
+        /// Mass of the payload.
         ///
         /// In kg.
         mass: f64 = 0.0, "mass_kg" [KG, 0, 1000];
-        /// Its centre of mass from the origin of the sensor, in its axes.
+        /// Centre of mass of the payload from the origin of the sensor, in the axes of the sensor.
         ///
         /// C from So, expressed in S, m.
         p_sc: Vector3<f64> = [0.0; 3], "centre_mm" [MM, -10000, 10000];
-        /// Acceleration of gravity.
+        /// Acceleration of gravity, in gravity_axes.
         ///
         /// Expressed in O, m/s²: (0, 0, −9.81) when z of O points up.
         gravity_o: Vector3<f64> = [0.0, 0.0, -9.81], "gravity_m_per_s2" [M_PER_S2, -100, 100];
@@ -51,7 +51,7 @@ parameters! {
         /// So from To, expressed in T, m.
         position: Vector3<f64> = [0.0; 3], "sensor_position_mm" [MM, -1e5, 1e5];
         /// Orientation of the sensor in the frame of the tip, as a quaternion x, y, z, w; left out:
-        /// the same axes.
+        /// the axes of the tip.
         orientation_xyzw: Option<[f64; 4]> = None, "sensor_orientation_xyzw" [QUATERNION, 0.999, 1.001] like "[0, 0, 0, 1]";
     }
 }
@@ -60,11 +60,11 @@ parameters! {
     /// Sensor reading without contact and payload, expressed in S.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct SensorBias in "compensation.bias" {
-        /// The force, in the axes of the sensor.
+        /// Force of the bias, in the axes of the sensor.
         ///
         /// In N.
         force: Vector3<f64> = [0.0; 3], "force_n" [N, -10000, 10000];
-        /// The torque, in the axes of the sensor.
+        /// Torque of the bias, in the axes of the sensor.
         ///
         /// In N·m.
         torque: Vector3<f64> = [0.0; 3], "torque_nm" [NM, -10000, 10000];

@@ -14,18 +14,18 @@ parameters! {
     /// The two thresholds of a [`ContactGate`].
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct ContactGateParams in "contact" {
-        /// A force above this begins a contact; no less than off_n.
+        /// Force above which a contact begins; no less than off_n.
         ///
         /// In N. Eight times the 0.05 N variation of noise and bias of a usual sensor, and far
         /// below the 2–4 N of a pressing hand.
         on: f64 = 0.4, "on_n" [N, 0, 1000];
-        /// A force below this ends it.
+        /// Force below which a contact ends.
         ///
         /// In N. Above noise and bias together, and low enough below `on` that noise at the
         /// threshold does not chatter.
         off: f64 = 0.22, "off_n" [N, 0, 1000];
-        /// Below on_n, what the zero of the sensor may be off by: a force above this that its noise
-        /// does not explain may be a light touch, which neither moves the mesh nor frees space.
+        /// Largest error of the zero of the sensor, below on_n: a force above it, beyond the noise,
+        /// may be a light touch, which neither moves the mesh nor frees space.
         ///
         /// In N. Three times the 0.05 N variation of the bias of a usual sensor.
         free: f64 = 0.15, "free_n" [N, 0, 1000];

@@ -8,29 +8,30 @@ parameters! {
     /// Settings of a [`super::Synchroniser`]; times in ns.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct SyncParams in "sync" {
-        /// How far a message may lag behind the newest stamp of its stream; also how long a sample
-        /// is held back.
+        /// Largest lag of a message behind the newest stamp of its stream; each sample waits for
+        /// this time.
         ///
         /// Real transports swap and delay by up to 16 ms.
         reorder_ns: i64 = 20.0, "reorder_ms" [MS, 0, 60000];
-        /// Largest distance between the two poses around a wrench; over a longer one a path would
-        /// be invented.
+        /// Largest time between the two poses around a wrench; a wrench in a longer gap makes no
+        /// sample.
         ///
         /// A hand at 50 mm/s goes 1.5 mm, the radius of a usual ball, in 30 ms.
         largest_gap_ns: i64 = 30.0, "largest_gap_ms" [MS, 0, 60000];
-        /// A stamp this far ahead of its stream is accepted only when the next four agree; it costs
-        /// only itself when they do not.
+        /// Largest step of a stamp ahead of its stream; a message beyond it counts only if the next
+        /// four agree with it.
         ///
         /// A stream slower than 10 Hz comes five messages at a time, late and whole.
         largest_jump_ns: i64 = 0.1, "largest_jump_s" [S, 0, 1e6];
-        /// What the clock of the wrench reads beyond the clock of the pose; taken off its stamps.
+        /// Offset of the wrench clock, positive if it is ahead of the pose clock; pairing subtracts
+        /// it from the stamps of the wrenches.
         wrench_offset_ns: i64 = 0.0, "wrench_offset_ms" [MS, -60000, 60000];
-        /// What the clock of the wrench gains on the clock of the pose, from the first wrench on;
-        /// taken off its stamps beside the offset.
+        /// Drift of the wrench clock from the first wrench on, positive if it gains on the pose
+        /// clock; pairing subtracts it beside the offset.
         ///
         /// Two computers without a common clock differ by 100 ppm: after five minutes 30 ms.
         wrench_drift: f64 = 0.0, "wrench_drift_ppm" [PPM, -1000, 1000];
-        /// How many messages of each stream are held.
+        /// Maximum number of messages held for each stream.
         ///
         /// 4096 are four seconds at 1 kHz, half a megabyte.
         capacity: usize = 4096, "capacity" [MESSAGES, 2, 1e6];

@@ -38,17 +38,18 @@ parameters! {
         /// In s; 0 filters nothing. 6 ms are three poses at 500 Hz: 0.2 mm of pose noise becomes
         /// 0.1 mm, while a hand at 50 mm/s lags 0.3 mm behind, along the surface.
         smoothing: f64 = 6.0, "smoothing_ms" [MS, 0, 10000];
-        /// Time constant of the velocity.
+        /// Time constant of the filter on the velocity.
         ///
         /// In s. With 0.2 mm of pose noise and μ = 0.4 half of the normals are then within 3° (12
         /// ms: 4°); for a hand that turns by 5 rad/s they lag 6° behind, along the surface.
         velocity_smoothing: f64 = 20.0, "velocity_smoothing_ms" [MS, 0, 10000];
-        /// Uncertainty of the velocity: slower than this the sliding direction hardly determines
+        /// Uncertainty of the velocity; below this speed the sliding direction hardly determines
         /// the normal.
         ///
         /// In m/s: 2.5 times the noise of the velocity for 0.2 mm of pose noise.
         slowest: f64 = 8.0, "slowest_mm_per_s" [MM_PER_S, 0, 1e6];
-        /// Cosine of the widest friction cone accepted; 0.9135 is 24 degrees, friction 0.45.
+        /// Cosine of the widest accepted friction cone; 0.9135 is 24 degrees, a friction
+        /// coefficient of 0.45.
         ///
         /// Maximum angle between normal and force: dry metal on metal.
         cone_cosine: f64 = WIDEST_CONE_COSINE, "cone_cosine" [ONE, 0, 1];

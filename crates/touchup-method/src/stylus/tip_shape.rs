@@ -68,14 +68,14 @@ parameters! {
     /// Sizes that only some tips have.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct TipSizes in "tip" {
-        /// Flat: radius of the rounded edge, no more than radius_mm; left out: sharp.
+        /// Radius of the rounded edge of a flat tip, no more than radius_mm; left out: sharp.
         edge_radius: Option<f64> = None, "edge_radius_mm" [MM, 0, 1000] like "0.2";
-        /// Cone: the angle between axis and flank.
+        /// Angle between the axis and the flank of a cone.
         ///
         /// A blunter cone is a flat tip, a more pointed one a needle, which bends.
         half_angle: Option<f64> = None, "half_angle_deg" [DEG, 1, 80, "take shape: flat for a blunter one"] like "20";
-        /// Flat and cone: how far from the origin the tip is known to reach, more than
-        /// edge_radius_mm; left out: two diameters, no less than 5 mm.
+        /// Known length of a flat or conical tip from its origin, more than edge_radius_mm; left
+        /// out: two diameters, no less than 5 mm.
         length: Option<f64> = None, "length_mm" [MM, 0.001, 1000] like "6";
     }
 }

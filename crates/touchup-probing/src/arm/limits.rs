@@ -20,62 +20,63 @@ parameters! {
     /// By default there is no box: only the installer of the arm knows its workspace.
     #[derive(Clone, Debug, PartialEq)]
     pub struct Limits in "robot" {
-        /// Smallest corner of the box that the centre of the ball stays in, in the base of the arm;
-        /// with the default the arm can be nowhere.
+        /// Lowest corner of the box that the centre of the ball must not leave, in the base of the
+        /// arm; the default box is a single point, so the arm cannot move.
         ///
         /// m in B.
         lowest: Point3<f64> = [0.0; 3], "workspace_low_mm" [MM, -5000, 5000];
-        /// Largest corner of it, no less than workspace_low_mm.
+        /// Highest corner of the box that the centre of the ball must not leave, in the base of the
+        /// arm; no less than workspace_low_mm.
         ///
         /// m in B.
         highest: Point3<f64> = [0.0; 3], "workspace_high_mm" [MM, -5000, 5000];
-        /// Smallest corner of the box that all of the arm but its base stays in, in the base of the
-        /// arm: the table, walls; left out: nothing is known of them.
+        /// Lowest corner of the box that the arm except its base must not leave, in the base of the
+        /// arm, such as table and walls; left out: no such bound.
         ///
         /// m in B.
         arm_lowest: Option<Point3<f64>> = None, "arm_low_mm" [MM, -5000, 5000] like "[-2000, -2000, 0]";
-        /// Largest corner of it.
+        /// Highest corner of the box that the arm except its base must not leave, in the base of
+        /// the arm; left out: no such bound.
         ///
         /// m in B.
         arm_highest: Option<Point3<f64>> = None, "arm_high_mm" [MM, -5000, 5000] like "[2000, 2000, 2000]";
-        /// Force at the tip at which everything stops; well below that of the arm's own safety
+        /// Force at the tip that stops every motion; well below the limit of the arm's own safety
         /// system.
         ///
         /// In N; the limit of a UR's safety system is at least 50 N.
         force: f64 = 15.0, "largest_force_n" [N, 0.1, 100];
-        /// No motion of the tip is faster.
+        /// Largest speed of the tip.
         ///
         /// In m/s.
         speed: f64 = 100.0, "largest_mm_per_s" [MM_PER_S, 0.1, 250];
-        /// No joint turns faster: it does near a pose where the arm is nearly stuck.
+        /// Largest speed of a joint; joints turn fast near singular poses.
         ///
         /// In rad/s.
         joint_speed: f64 = 90.0, "largest_joint_deg_per_s" [DEG_PER_S, 1, 360];
-        /// Acceleration of all motions.
+        /// Acceleration of the tip in every motion.
         ///
         /// Of the tip, m/s².
         acceleration: f64 = 500.0, "acceleration_mm_per_s2" [MM_PER_S2, 10, 5000];
-        /// Deceleration of a stop at a fault or at an unexpected contact. The largest speed of
-        /// every motion follows from it and from tip.stiffness_n_per_mm, so that the force at such
-        /// a contact stays below largest_force_n.
+        /// Deceleration of the tip in a stop at a fault or at an unexpected contact. With
+        /// tip.stiffness_n_per_mm it limits the speed of every motion, so that the force at such a
+        /// contact stays below largest_force_n.
         ///
         /// Of the tip, m/s².
         braking: f64 = 5000.0, "fault_stop_mm_per_s2" [MM_PER_S2, 10, 10000];
-        /// Force at rest, before zeroing, above which the sensor is not zeroed: the tip would touch
-        /// something.
+        /// Largest force at rest at which the sensor may be zeroed; a larger one means contact.
         ///
         /// In N.
         tare: f64 = 5.0, "largest_tare_n" [N, 0.1, 100];
-        /// Travel of one search at most.
+        /// Largest travel of one search.
         ///
         /// In m.
         search: f64 = 15.0, "search_mm" [MM, 0.5, 100];
-        /// Time of one feature at most.
+        /// Longest time for one feature.
         ///
         /// In s.
         time: f64 = 600.0, "time_s" [S, 1, 86400];
-        /// How far the arm stays from singular poses: smallest singular value of its Jacobian,
-        /// lengths over its reach.
+        /// Smallest distance of the arm from singular poses: smallest singular value of its
+        /// Jacobian, lengths over its reach.
         ///
         /// The least [`ArmGeometry::dexterity`] of any pose.
         dexterity: f64 = 0.02, "least_dexterity" [ONE, 0, 1];

@@ -37,7 +37,7 @@ parameters! {
         /// Standard deviation of this prior, s: a cycle or two of a controller at 500 Hz, and its
         /// filter.
         delay_sigma: f64 = 4e-3;
-        /// Standard deviation of the measured force.
+        /// Standard deviation of the noise of the measured force.
         ///
         /// In N, in free air, for a wrist; also the least that the fit believes.
         force_noise: f64 = 0.15, "force_noise_n" [N, 0.0001, 10];

@@ -6,31 +6,31 @@ use touchup_method::parameters;
 use touchup_method::parameters::SettingError;
 
 parameters! {
-    /// How a touch is made.
+    /// Settings of a touch.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct TouchParams in "robot" {
-        /// Force that a touch presses with, no more than largest_force_n.
+        /// Pressing force of a touch, no more than largest_force_n.
         ///
         /// In N, of the second search.
         force: f64 = 3.0, "touch_force_n" [N, 0.1, 100];
-        /// Force at which a search stops: several deviations of its noise, no more than 0.8 of
+        /// Force that ends a search: several standard deviations of the noise, no more than 0.8 of
         /// touch_force_n.
         ///
         /// In N, of the first search.
         trigger: f64 = 1.0, "trigger_n" [N, 0.05, 80];
         /// Speed through free air.
         ///
-        /// In m/s: between touches, where the path is clear.
+        /// In m/s: between touches, on a clear path.
         link_speed: f64 = 50.0, "link_mm_per_s" [MM_PER_S, 0.1, 250];
-        /// Speed while searching; slower where tip.stiffness_n_per_mm asks for it.
+        /// Largest speed of a search; tip.stiffness_n_per_mm may lower it.
         ///
         /// In m/s, maximum: a stiff arm and part reduce it, to keep `force`.
         search_speed: f64 = 10.0, "search_mm_per_s" [MM_PER_S, 0.1, 250];
-        /// Speed while measuring.
+        /// Speed of the second search of a touch, which measures.
         ///
         /// In m/s, of the second search.
         measure_speed: f64 = 2.0, "measure_mm_per_s" [MM_PER_S, 0.05, 250];
-        /// Speed while the ball slides over what was found, at most.
+        /// Largest speed of the ball in a slide over a feature.
         ///
         /// In m/s.
         slide_speed: f64 = 10.0, "slide_mm_per_s" [MM_PER_S, 0.1, 250];
@@ -40,7 +40,7 @@ parameters! {
         back_off: f64 = 0.3e-3;
         /// Estimated stiffness of arm, probe and part together, N/m.
         stiffness: f64 = 15e3;
-        /// Time from a contact to the beginning of braking.
+        /// Time from a contact to the start of braking.
         ///
         /// In s.
         latency: f64 = 20.0, "latency_ms" [MS, 0, 200];

@@ -20,11 +20,11 @@ parameters! {
         ///
         /// In m.
         shaft_radius: f64 = 1.0, "shaft_radius_mm" [MM, 0.05, 50];
-        /// How much of the shaft, and of the hand behind it, must keep clear of the mesh.
+        /// Length of the shaft, with the hand behind it, that must keep clear of the mesh.
         ///
         /// In m.
         shaft_length: f64 = 60.0, "shaft_length_mm" [MM, 0, 500];
-        /// What the scan may be wrong by, in moves through free air.
+        /// Margin for the error of the scan, in moves through free air.
         ///
         /// In m, of both.
         margin: f64 = 0.5, "margin_mm" [MM, 0, 50];

@@ -16,30 +16,30 @@ parameters! {
     /// Standard uncertainties of an arm and of the place of its part.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct ArmUncertainty in "robot" {
-        /// Standard uncertainty of the radius of the ball: twice of it is in each diameter, width
-        /// and length, once in the place of a plane.
+        /// Standard uncertainty of the radius of the ball: each diameter, width and length contains
+        /// it twice, the place of a plane once.
         ///
         /// In m. A ruby ball is round within 0.2 µm; a gauge block or a ring says its size within 1
         /// µm.
         radius: f64 = 0.001, "radius_sigma_mm" [MM, 0, 10];
-        /// Standard uncertainty of where the scan lies in the base (scan_to_space), along each
-        /// axis; 0: places are those of the scan as the scene puts it.
+        /// Standard uncertainty of the position of the scan in the base (scan_to_space), along each
+        /// axis; 0: places are relative to the scan as the scene puts it.
         ///
         /// In m. 0: a registration that nobody has compared with the part has no figure, and a
         /// made-up one would be in each result.
         place: f64 = 0.0, "place_sigma_mm" [MM, 0, 100];
-        /// … of how it is turned, about each axis; it counts with the distance from
-        /// registered_at_mm.
+        /// Standard uncertainty of the orientation of the scan in the base, about each axis; its
+        /// effect grows with the distance from registered_at_mm.
         ///
         /// In rad. As for the place.
         turn: f64 = 0.0, "turn_sigma_deg" [DEG, 0, 20];
-        /// By how much places are less certain with each metre from registered_at_mm: the
-        /// kinematics of the arm, joints and lengths.
+        /// Growth of the uncertainty of places with each metre from registered_at_mm, due to the
+        /// kinematics of the arm: joints and lengths.
         ///
         /// m per m. 0 until it was measured.
         growth: f64 = 0.0, "growth_mm_per_m" [MM_PER_M, 0, 100];
-        /// Where the place of the scan is known best, in the frame of the scan: the middle of the
-        /// features or spheres that it was found by.
+        /// Best known place of the scan, in the frame of the scan: the middle of the features or
+        /// spheres of its registration.
         ///
         /// m, in O.
         registered_at: Vector3<f64> = [0.0, 0.0, 0.0], "registered_at_mm" [MM, -1e6, 1e6];

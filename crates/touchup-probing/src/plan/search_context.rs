@@ -21,11 +21,11 @@ parameters! {
         /// Maximum error of the flag, m; for a plane or an unknown region, radius of the touched
         /// field.
         flag_radius: f64 = 3e-3;
-        /// Distance of the ball from the surface where a search begins.
+        /// Distance of the ball from the surface at the start of a search.
         ///
         /// In m.
         clearance: f64 = 3.0, "clearance_mm" [MM, 0.5, 50];
-        /// How deep the centre of the ball is let into a hole.
+        /// Depth of the centre of the ball in a hole.
         ///
         /// In m.
         depth: f64 = 5.0, "depth_mm" [MM, 0, 100];
@@ -33,16 +33,15 @@ parameters! {
         quantity: FeatureQuantity = FeatureQuantity::All;
         /// Requested standard deviation of this number, m, or rad of an axis.
         sigma: f64 = 4e-6;
-        /// Touches of a feature at most.
+        /// Maximum number of touches of one feature.
         budget: usize = 39, "touches" [TOUCHES, 1, 1e4];
-        /// Standard deviation of one touch beside that of its own curve: the repeatability of arm
-        /// and probe (`touchup check`).
+        /// Standard deviation of one touch due to the repeatability of arm and probe (`touchup
+        /// check`), beside that of its own force curve.
         ///
         /// In m. The maker of a UR5e states ±0.03 mm.
         touch_sigma: f64 = 0.03, "touch_sigma_mm" [MM, 1e-5, 1];
-        /// Standard uncertainty with which the walls of holes, slots and bosses are perpendicular
-        /// to the surface around them, in each of two directions, unless their touches say
-        /// otherwise.
+        /// Standard uncertainty of the perpendicularity of the walls of holes, slots and bosses to
+        /// the surface around them, in each of two directions, unless their touches measure it.
         ///
         /// In rad. 0.13° is 0.4 mm in 100 mm, the general tolerance K of ISO 2768-2, taken as a
         /// uniform distribution.

@@ -60,7 +60,7 @@ def refine(
       ROS 1, or a table.
     - `pose_topic`, `wrench_topic`, `pose_frame`, `base_frame`, `stamp`: of a file, as of `Recording.read`. `markers_topic`: of the
       markers that give the pose.
-    - `scene`: what differs from the usual cell. It must name the radius of the ball: ``{"tip": {"radius_mm": 1.5}}``.
+    - `scene`: differences from the default scene; it must name the radius of the ball: ``{"tip": {"radius_mm": 1.5}}``.
     - `force`: refines also where something of the recording is surely wrong.
 
     Raises `TouchupError`, and warns with `TouchupWarning` of what is doubtful. The interpreter is free for other threads meanwhile.

@@ -1,4 +1,4 @@
-"""The scene: what differs from the usual cell."""
+"""The scene: differences from the default one."""
 
 from __future__ import annotations
 

@@ -45,62 +45,64 @@ parameters! {
     /// sensors need.
     #[derive(Clone, Debug, PartialEq)]
     pub struct Scene in "" {
-        /// Pairs poses with wrenches: the pose is interpolated at the stamp of each wrench. Off:
+        /// Pairing of poses with wrenches: interpolates the pose at the stamp of each wrench. Off:
         /// only messages of equal stamp pair.
         sync: Option<SyncParams> = Some(Default::default()), "sync";
-        /// The columns of a recording that is a table (CSV, or the log of a UR's RTDE): by their
-        /// names in its first line, each with its unit, as in x_mm or `x [mm]`. Not named: the
-        /// usual names are looked for, and those of RTDE.
+        /// Columns of a recording that is a table (CSV, or the log of a UR's RTDE), by their names
+        /// in the first line, each with its unit, as in x_mm or `x [mm]`. Not named: the usual
+        /// names and those of RTDE apply.
         columns: Option<TableColumns> = None, "columns";
-        /// Estimates how late the clock of the wrench reads, from the moments at which contact
-        /// begins; reported, and never applied unasked. It has no keys. Off: it is not estimated.
+        /// Estimate of the delay of the wrench clock, from the onsets of contacts. The program
+        /// reports it, and applies it only on request. It has no keys. Off: no estimate.
         clock: Option<ClockSection> = Some(Default::default()), "clock";
-        /// The markers on the stylus, for recordings that hold them in place of its pose
-        /// (--markers-topic): a rigid body is pulled to the markers that are seen by springs and
-        /// dampers. The values are those of the simulated stylus.
+        /// Markers on the stylus, for recordings that hold them in place of its pose
+        /// (--markers-topic): springs and dampers pull a rigid body to the visible markers. The
+        /// default values are those of the simulated stylus.
         markers: Option<MarkersSection> = None, "markers";
-        /// Where the scan lies in the frame of the recorded poses: p_space = R p_scan + t (`touchup
+        /// Pose of the scan in the frame of the recorded poses: p_space = R p_scan + t (`touchup
         /// calibrate scan`). Not named: the poses are in the frame of the scan.
         scan_to_space: Option<ScanToSpaceSection> = None, "scan_to_space";
-        /// Takes weight and bias off the wrench (`touchup calibrate payload`). Not named: the
-        /// sensor has the axes of the tip and its driver does it.
+        /// Subtraction of weight and bias from the wrench (`touchup calibrate payload`). Not named:
+        /// the driver of the sensor subtracts them, and the sensor has the axes of the tip.
         compensation: Option<CompensationSection> = None, "compensation";
-        /// Follows the slow drift of the sensor while nothing is touched. Not named: the bias stays
-        /// as it is named.
+        /// Tracking of the slow drift of the sensor in free air. Not named: the bias stays
+        /// constant.
         bias_tracking: Option<BiasParams> = None, "bias_tracking";
-        /// Separates contact from free motion by the measured force. Off: every sample counts as
-        /// contact.
+        /// Contact gate: separates contact from free motion by the measured force. Off: every
+        /// sample counts as contact.
         contact: Option<ContactGateParams> = Some(Default::default()), "contact";
-        /// The tip that touches: a ball, the flat end of a cylinder, or a cone with a round nose.
-        /// The origin of the pose is the centre of the ball or nose, or the middle of the flat end;
-        /// its z runs along the shaft, from the tip to the handle. Off: a rigid point.
+        /// Tip of the stylus: a ball, the flat end of a cylinder, or a cone with a round nose. The
+        /// origin of the pose is the centre of the ball or nose, or the middle of the flat end; its
+        /// z axis runs along the shaft, from the tip to the handle. Off: a rigid point.
         tip: Option<TipSection> = Some(Default::default()), "tip";
-        /// The scan, and how good it is. Off: it counts as free of noise.
+        /// Scan and its quality. Off: the scan is free of noise.
         scan: Option<ScanSection> = Some(Default::default()), "scan";
-        /// Takes friction out of the measured normal while the ball slides, in the haptic update
-        /// and in the patch. Off: the force is the normal. All but the cone is for the haptic
-        /// update, which knows the past alone; the patch looks ahead and finds its own.
+        /// Removal of friction from the measured normal while the ball slides, in the haptic update
+        /// and in the patch. Off: the direction of the force is the normal. The keys are for the
+        /// haptic update, which knows only the past; of them the patch uses only the cone, as it
+        /// looks ahead.
         sliding: Option<SlidingParams> = Some(Default::default()), "sliding";
-        /// Free space: what the tip passes through without a force is not there, in the haptic
-        /// update and in the patch. Off: lids over holes stay. The keys are for the haptic update;
-        /// in the patch free space counts as touches do.
+        /// Carving by free space: removes surface that the tip passes through without a force, in
+        /// the haptic update and in the patch. Off: lids over holes stay. The keys are for the
+        /// haptic update; in the patch free space counts as touches do.
         carve: Option<CarveParams> = Some(Default::default()), "carve";
-        /// Keeps the mesh sound: an update that would break one of these limits is cut back. Off:
-        /// anything goes, as in the paper, and a noisy scan may blow up.
+        /// Guard of the mesh: cuts back an update that would exceed one of these limits. Off: no
+        /// limits, as in the paper, and the mesh of a noisy scan may diverge.
         guard: Option<GuardParams> = Some(Default::default()), "guard";
-        /// Reconstructs the surface where it was touched, finer than the scan: edges are sharp,
-        /// closed holes open, and what was not touched stays as it was. Off: the triangles of the
-        /// scan stay and are only moved.
+        /// Reconstruction of the touched surface, finer than the scan: edges are sharp, closed
+        /// holes open, and the untouched scan stays unchanged. Off: the triangles of the scan stay
+        /// and only move.
         patch: Option<PatchParams> = Some(Default::default()), "patch";
-        /// Reports how well each vertex is known (sigma_mm in the PLY), and rejects touches that
-        /// contradict their place as outliers. A second pass that confirms the contradiction moves
-        /// the place. Needs patch. Off: every touch counts, and nothing is reported.
+        /// Uncertainty of each vertex (sigma_mm in the PLY), and rejection of outliers: touches
+        /// that contradict their place. A second pass that confirms an outlier relocates the place.
+        /// Needs patch. Off: every touch counts, and the result has no uncertainty.
         uncertainty: Option<UncertaintyParams> = Some(Default::default()), "uncertainty";
-        /// The arm that holds a probe (`touchup probe`, docs/probing.md). Not named: nothing is
-        /// probed. A request can ask for less than these limits, never for more. It needs a ball
-        /// for a tip, and scan_to_space says where the scan lies in its base.
+        /// Arm with a probe (`touchup probe`, docs/probing.md). Not named: no probing. A request
+        /// can ask for less than these limits, never for more. The tip must be a ball, and
+        /// scan_to_space is the pose of the scan in the base of the arm.
         robot: Option<RobotSection> = None, "robot";
-        /// Moves the mesh until measured and expected force agree. Off: nothing moves it.
+        /// Haptic update: moves the mesh until measured and expected force agree. Off: the mesh
+        /// stays.
         refine: Option<RefineSection> = Some(Default::default()), "refine";
     }
 }

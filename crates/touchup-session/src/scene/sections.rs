@@ -29,14 +29,15 @@ parameters! {
     /// `markers`: by default the stylus of the simulation.
     #[derive(Clone, Debug, PartialEq)]
     pub struct MarkersSection in "markers" {
-        /// Each marker from the centre of the ball, in the axes of the tip (z: along the shaft, tip
-        /// to handle), by label from 0 on; 3 to 16, not on one line.
+        /// Position of each marker from the centre of the ball, in the axes of the tip (z: along
+        /// the shaft, tip to handle), in the order of labels from 0 on; 3 to 16 markers, not on one
+        /// line.
         ///
         /// m, in T.
         positions: Vec<Vector3<f64>> = MarkerBody::STYLUS_MM.into(), "positions_mm" [MM, -10000, 10000];
     }
     with {
-        /// How the body is followed.
+        /// Settings of the filter that follows the body.
         params: MarkerParams,
     }
     check MarkersSection::is_body;
@@ -65,7 +66,7 @@ parameters! {
         ///
         /// t, m.
         position: Vector3<f64> = [0.0; 3], "position_mm" [MM, -1e6, 1e6];
-        /// Orientation of the scan's axes in that frame, as a quaternion x, y, z, w.
+        /// Orientation of the scan in the frame of the poses, as a quaternion x, y, z, w.
         ///
         /// R.
         orientation_xyzw: [f64; 4] = NO_TURN, "orientation_xyzw" [QUATERNION, 0.999, 1.001];
@@ -83,13 +84,13 @@ parameters! {
     /// `compensation`
     #[derive(Clone, Debug, PartialEq)]
     pub struct CompensationSection in "compensation" {
-        /// What hangs on the sensor.
+        /// Payload of the sensor: everything beyond its measuring plane.
         payload: Option<PayloadSection> = None, "payload";
-        /// What the sensor reads when nothing touches and nothing hangs on it.
+        /// Bias of the sensor: its reading without contact and payload.
         bias: Option<SensorBias> = None, "bias";
     }
     with {
-        /// Where the sensor sits.
+        /// Mount of the sensor.
         mount: SensorMount,
     }
 }
@@ -110,8 +111,8 @@ parameters! {
     /// `compensation.payload`
     #[derive(Clone, Debug, PartialEq)]
     pub struct PayloadSection in "compensation.payload" {
-        /// In whose axes gravity is: the scan's own, or those of the recorded poses, which
-        /// scan_to_space turns.
+        /// Axes of the vector of gravity: those of the scan (object), or those of the recorded
+        /// poses, turned by scan_to_space (space).
         gravity_axes: GravityAxes = GravityAxes::Object, "gravity_axes";
     }
     with {
@@ -140,8 +141,9 @@ parameters! {
     pub struct TipSection in "tip" {
         /// Shape of the tip.
         shape: ShapeName = ShapeName::Ball, "shape";
-        /// Centre of the ball from the origin of the recorded pose, in its axes (`touchup calibrate
-        /// tip`); left out: it is that origin. The positions of markers are from that origin too.
+        /// Centre of the ball from the origin of the recorded pose, in the axes of that pose
+        /// (`touchup calibrate tip`); left out: 0. Positions of markers are from the origin of the
+        /// recorded pose too.
         ///
         /// m.
         offset: Option<Vector3<f64>> = None, "offset_mm" [MM, -10000, 10000] like "[0, 0, 0]";
@@ -185,26 +187,25 @@ parameters! {
     /// `scan`
     #[derive(Clone, Debug, PartialEq)]
     pub struct ScanSection in "scan" {
-        /// The scan itself, where none is named otherwise: PLY, STL or OBJ, or a point cloud (PLY,
-        /// PCD, XYZ or E57), relative to the folder of this scene.
+        /// File of the scan, unless a flag or an argument names one: PLY, STL or OBJ, or a point
+        /// cloud (PLY, PCD, XYZ or E57), relative to the folder of this scene.
         file: Option<PathBuf> = None, "file" like "scan.ply";
-        /// Unit of the coordinates in that file.
+        /// Unit of the coordinates in the file of the scan.
         unit: MeshUnit = MeshUnit::Millimetre, "unit";
-        /// Lowest corner of the box that the centre of the ball is in whenever it touches, in the
-        /// frame of the scan: only what is near it gets adjacency and a tree, the rest of the scan
-        /// is kept as it is and written with the result; touches elsewhere are refused. Not with an
-        /// arm, and the node shows the part near the box alone. Name both corners; left out:
-        /// anywhere.
+        /// Lowest corner of the box of the ball's centre in all touches, in the frame of the scan.
+        /// Only the scan near the box gets adjacency and a tree; the result holds the rest of the
+        /// scan unchanged. Touches outside the box are refused; an arm needs the whole scan, and
+        /// the node shows only the part near the box. Name both corners; left out: no box.
         ///
         /// m, in O.
         region_low: Option<Point3<f64>> = None, "region_low_mm" [MM, -1e6, 1e6] like "[-20, -20, -10]";
-        /// Highest corner of that box.
+        /// Highest corner of the box of the ball's centre in all touches, in the frame of the scan.
         ///
         /// m, in O.
         region_high: Option<Point3<f64>> = None, "region_high_mm" [MM, -1e6, 1e6] like "[20, 20, 10]";
     }
     with {
-        /// How good it is.
+        /// Quality of the scan.
         quality: ScanParams,
     }
     check ScanSection::is_box;
@@ -225,14 +226,14 @@ impl ScanSection {
 }
 
 words! {
-    /// Which rule moves the mesh.
+    /// Rule of the haptic update.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
     pub enum Mode {
-        /// What works on real scans.
+        /// The rule for real scans.
         #[default]
         Robust = "robust",
-        /// The published rule, taken literally: no gate, no friction, no carving, no guard,
-        /// whatever the scene names.
+        /// The published rule, taken literally: no gate, friction, carving or guard, even if the
+        /// scene names them.
         Paper = "paper",
     }
 }
@@ -249,32 +250,32 @@ words! {
 }
 
 parameters! {
-    /// `refine`; a key that is left out is as the mode has it.
+    /// `refine`; a key that is left out has the value of the mode.
     #[derive(Clone, Debug, PartialEq)]
     pub struct RefineSection in "refine" {
-        /// Which rule moves the mesh; paper: the published one taken literally, without contact,
-        /// sliding, carve, guard and patch whatever is named.
+        /// Rule of the haptic update: robust, for real scans, or paper, the published rule without
+        /// contact, sliding, carve, guard and patch, even if the scene names them.
         mode: Mode = Mode::Robust, "mode";
-        /// Expected force over depth: the sigmoid of Eq 3, or the spring of the tip; left out: the
-        /// spring where its stiffness is known.
+        /// Model of the expected force over depth: the sigmoid of Eq 3, or the spring of the tip;
+        /// left out: the spring in mode robust if its stiffness is known, else the sigmoid.
         contact_model: Option<ModelName> = None, "contact_model" like "spring";
-        /// Speed of a face for each newton of mismatch (Eq 6); left out: as the mode has it.
+        /// Speed of a face for each newton of mismatch (Eq 6); left out: the value of the mode.
         alpha: Option<f64> = None, "alpha_m_per_n_s" [M_PER_N_S, 0, 1e6] like "0.00125";
-        /// Turning speed of a face for each square newton of mismatch (Eq 7); left out: as the mode
-        /// has it.
+        /// Turning speed of a face for each square newton of mismatch (Eq 7); left out: the value
+        /// of the mode.
         beta: Option<f64> = None, "beta_per_n2_s" [PER_N2_S, 0, 1e9] like "0.1";
-        /// Robust: rate at which a face turns to the measured normal, whatever the force; takes the
-        /// place of beta.
+        /// Turning rate of a face to the measured normal, independent of the force, in place of
+        /// beta; left out: the value of the mode.
         turning: Option<f64> = None, "turning_per_s" [PER_S, 0, 1e6] like "30";
-        /// How position and normal are put together: one after the other (lie), with a correction
-        /// (corrected), solved together to 1e-9 (bounded, as with mode paper), or by adaptive
-        /// Runge–Kutta (dp5).
+        /// Integration of position and normal: one after the other (lie), with a correction
+        /// (corrected), coupled to 1e-9 (bounded, as with mode paper), or by adaptive Runge–Kutta
+        /// (dp5); left out: the value of the mode.
         step: Option<StepRule> = None, "step" like "lie";
-        /// In which direction a face moves: along the normal at the start of the sample (Eq 6), or
-        /// along the force.
+        /// Direction of the motion of a face: the normal at the start of the sample (normal0, Eq
+        /// 6), or the force (force); left out: the value of the mode.
         along: Option<MotionDirection> = None, "along" like "force";
-        /// Vertices within this distance of the touched face follow it; left out: the radius of the
-        /// ball.
+        /// Radius of the region of interest: vertices within this distance of the touched face
+        /// follow it; left out: the radius of the ball, and in mode paper one ring of faces.
         ///
         /// m.
         roi: Option<f64> = None, "roi_mm" [MM, 0, 1000] like "1.5";
@@ -310,15 +311,15 @@ parameters! {
         joint_states_topic: String = "/joint_states".to_owned(), "joint_states_topic";
         /// Topic of force_torque_sensor_broadcaster.
         wrench_topic: String = "/force_torque_sensor_broadcaster/wrench".to_owned(), "wrench_topic";
-        /// Topic on which joint_trajectory_controller takes orders.
+        /// Topic of the orders to joint_trajectory_controller.
         trajectory_topic: String = "/joint_trajectory_controller/joint_trajectory".to_owned(), "trajectory_topic";
-        /// The frame that its wrenches name.
+        /// Frame of the wrenches, as in their headers.
         wrench_frame: String = "tool0".to_owned(), "wrench_frame";
-        /// Origin of that frame in the flange.
+        /// Origin of wrench_frame in the flange.
         ///
         /// m.
         sensor_position: Vector3<f64> = [0.0; 3], "sensor_position_mm" [MM, -1000, 1000];
-        /// Axes of that frame in the flange, as a quaternion x, y, z, w.
+        /// Orientation of wrench_frame in the flange, as a quaternion x, y, z, w.
         sensor_orientation_xyzw: [f64; 4] = NO_TURN, "sensor_orientation_xyzw" [QUATERNION, 0.999, 1.001];
     }
 }
@@ -347,50 +348,49 @@ impl Ros2ControlSection {
 }
 
 parameters! {
-    /// `robot`: pose of its base, its payload, and the volume that it must never leave.
+    /// `robot`: model, payload, tip and limits of the arm.
     #[derive(Clone, Debug, PartialEq)]
     pub struct RobotSection in "robot" {
         /// Model of the arm.
         model: ArmModel = ArmModel::Ur5e, "model";
-        /// With model: urdf, the description of the arm, its macros expanded, relative to the
-        /// folder of this scene.
+        /// Description of the arm for model: urdf, with its macros expanded, relative to the folder
+        /// of this scene.
         urdf: Option<PathBuf> = None, "urdf" like "arm.urdf";
-        /// The link of the URDF whose frame is the base of the arm.
+        /// Link of the URDF whose frame is the base of the arm.
         base_link: String = "base_link".to_owned(), "base_link";
-        /// The link of the URDF whose frame is the flange.
+        /// Link of the URDF whose frame is the flange.
         flange_link: String = "tool0".to_owned(), "flange_link";
-        /// How thick links are that the URDF gives no simple shape: the radius of a capsule from
-        /// joint to joint.
+        /// Radius of links without a simple shape in the URDF, as capsules from joint to joint.
         ///
         /// m.
         link_radius: f64 = 60.0, "link_radius_mm" [MM, 1, 1000];
-        /// Not in the scene: what the URDF describes.
+        /// Not in the scene: the arm that the URDF describes.
         chain: Option<Arc<SerialChain>> = None;
-        /// The record that `touchup check --out` wrote, relative to the folder of this scene; what
-        /// it found is in each ±.
+        /// Record that `touchup check --out` wrote, relative to the folder of this scene; its
+        /// findings enter each ±.
         check: Option<PathBuf> = None, "check" like "check.json";
-        /// For how long a check counts: an older one stands in each result.
+        /// Age up to which a check counts; each result notes an older one.
         ///
         /// days.
         check_days: f64 = 30.0, "check_days" [DAYS, 0.01, 3650];
-        /// Temperature of the cell: where a check was made at one that differs by more than 5 K,
-        /// that stands in each result.
+        /// Temperature of the cell; each result notes a difference of more than 5 K from that of
+        /// the check.
         ///
         /// °C.
         temperature_c: Option<f64> = None, "temperature_c" [CELSIUS, -50, 100] like "21.5";
-        /// Not in the scene: what the record holds.
+        /// Not in the scene: the content of the record.
         check_record: Option<CheckRecord> = None;
-        /// Whether it may move at all; without it plans can be made and drawn.
+        /// Permission for the arm to move; false: only planning and drawing.
         allow_motion: bool = false, "allow_motion";
-        /// Name or address of its controller; a simulated arm has none.
+        /// Name or address of the controller; a simulated arm has none.
         host: String = String::new(), "host";
-        /// The folder that `touchup ur setup` prints (docs/ur.md); a simulated arm has none.
+        /// Folder that `touchup ur setup` prints (docs/ur.md); a simulated arm has none.
         site_packages: String = String::new(), "site_packages";
         /// Topics and sensor of an arm behind ros2_control (docs/ros2_control.md).
         ros2_control: Option<Ros2ControlSection> = None, "ros2_control";
-        /// Mass of all that hangs on the flange (`touchup calibrate payload --robot`).
+        /// Mass of everything on the flange (`touchup calibrate payload --robot`).
         payload_mass: f64 = 0.25, "payload_kg" [KG, 0, 50];
-        /// Its centre of mass in the flange.
+        /// Centre of mass of everything on the flange, in the flange.
         ///
         /// m.
         payload_centre: Vector3<f64> = [0.0, 0.0, 50.0], "payload_centre_mm" [MM, -1000, 1000];
@@ -398,25 +398,24 @@ parameters! {
         ///
         /// m. 150 mm before the flange, the handle towards it.
         tip_position: Vector3<f64> = [0.0, 0.0, 150.0], "tip_position_mm" [MM, -2000, 2000];
-        /// Axes of the tip in the flange (z: along the shaft, tip to handle), as a quaternion x, y,
-        /// z, w.
+        /// Orientation of the tip in the flange (z: along the shaft, tip to handle), as a
+        /// quaternion x, y, z, w.
         tip_orientation_xyzw: [f64; 4] = [1.0, 0.0, 0.0, 0.0], "tip_orientation_xyzw" [QUATERNION, 0.999, 1.001];
-        /// The numbers of a feature are to be known within ± this, with the probability
-        /// `confidence`.
+        /// Required ± of the numbers of a feature, with the probability `confidence`.
         ///
         /// m.
         tolerance: f64 = 0.05, "tolerance_mm" [MM, 0.0001, 10];
-        /// Probability with which they are within the tolerance.
+        /// Probability that the numbers of a feature are within the required ±.
         confidence: f64 = 0.95, "confidence" [ONE, 0.5, 0.9999];
     }
     with {
-        /// What it must never leave.
+        /// Bounds of its motions.
         limits: Limits,
-        /// How a touch is made; its stiffness is that of the tip.
+        /// Settings of a touch; its stiffness is that of the tip.
         touch: TouchParams,
-        /// What is wanted of a feature.
+        /// Requested numbers of a feature.
         pattern: PatternParams,
-        /// What must keep clear of the mesh.
+        /// Tool that must keep clear of the mesh.
         tool: Tool,
     }
     check RobotSection::is_limited;

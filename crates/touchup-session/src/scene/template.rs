@@ -6,19 +6,19 @@ use touchup_method::parameters::{Parameter, Section};
 use super::Scene;
 
 const HEAD: &str = "\
-# The scene that `touchup refine` uses when none is given. Copy it, change what differs, and give it by --scene.
-# What is not named is as it is here: leave out what does not differ. A part is not built where the scene says off, as in `patch: off`.
-# A line that begins with #key is a setting that is off here. Flags override all.
-# Written from the definition of the parameters, as docs/scene.md is, which has their ranges.
+# The scene that `touchup refine` uses without --scene. Copy it, change the values that differ, and give it by --scene.
+# Keys that are left out keep the values here. The word off leaves out a part, as in `patch: off`.
+# A line that begins with #key is a setting that is off here. Flags override the scene.
+# Written from the definition of the parameters, like docs/scene.md, which has their ranges.
 ";
 
 const TABLE_HEAD: &str = "\
 # The scene
 
-Every key of the YAML that `--scene` names, written from the definition of the parameters as
-[`config/default.yaml`](../config/default.yaml) is. A scene says what differs: what is not named takes its default, and a part is not built
-where the scene says `off`, as in `patch: off`. Parts that are off in the default scene are built where they are named; a name alone gives them
-their defaults. A number outside its range is refused by its key, an unknown key with its line and column.
+All keys of the YAML that `--scene` names, written from the definition of the parameters, like
+[`config/default.yaml`](../config/default.yaml). A scene lists differences only: keys that are left out keep their defaults, and the word `off`
+leaves out a part, as in `patch: off`. The name of a part that is off in the default scene turns it on, with its defaults if it has no keys. An
+error names the key of a number outside its range, and the line and column of an unknown key.
 ";
 
 /// Maximum number of letters in a line of comment.
@@ -118,7 +118,7 @@ fn rows(section: &Parameter) -> String {
     );
     let keys: Vec<_> = section.inner.iter().filter(|one| !one.is_section).collect();
     if !keys.is_empty() {
-        text += "\n| key | unit | range | default | what |\n|---|---|---|---|---|\n";
+        text += "\n| key | unit | range | default | meaning |\n|---|---|---|---|---|\n";
     }
     for one in keys {
         let default = one.default.as_deref().unwrap_or("left out");

@@ -25,20 +25,21 @@ parameters! {
     /// `columns`
     #[derive(Clone, Debug, PartialEq, Eq)]
     pub struct TableColumns in "columns" {
-        /// The column of the time: s, ms, us or ns.
+        /// Column of the time: s, ms, us or ns.
         time: Option<String> = None, "time" like "t_s";
         /// Position of the tip, three columns: m, mm, um or inch.
         position: Option<Vec<String>> = None, "position" like "[x_mm, y_mm, z_mm]";
-        /// Its orientation: a quaternion x, y, z, w, or a rotation vector of three columns in rad
-        /// or deg; left out and not found: none, which a ball needs none of when the wrench is in
-        /// the axes of the positions.
+        /// Orientation of the tip: a quaternion x, y, z, w, or a rotation vector of three columns
+        /// in rad or deg. Left out and without a usual name in the table: none, which suffices for
+        /// a ball with wrenches in the axes of the positions.
         orientation: Option<Vec<String>> = None, "orientation" like "[qx, qy, qz, qw]";
         /// Force of the part on the stylus, three columns: N or kN.
         force: Option<Vec<String>> = None, "force" like "[fx_n, fy_n, fz_n]";
-        /// Its torque: Nm or Nmm; left out and not found: 0.
+        /// Torque of the part on the stylus, three columns: Nm or Nmm. Left out and without a usual
+        /// name in the table: 0.
         torque: Option<Vec<String>> = None, "torque" like "[tx_nm, ty_nm, tz_nm]";
-        /// In whose axes force and torque are: those of the positions, or those of the tip, which
-        /// the orientation turns.
+        /// Axes of force and torque: those of the positions (pose), or those of the tip, turned by
+        /// the orientation (tip).
         wrench_axes: WrenchAxes = WrenchAxes::Pose, "wrench_axes";
     }
 }

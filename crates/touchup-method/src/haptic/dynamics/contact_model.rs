@@ -58,15 +58,15 @@ parameters! {
     /// The sigmoid of Eq 3.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct SigmoidParams in "refine" {
-        /// Largest force of the sigmoid.
+        /// Largest force of the sigmoid of Eq 3.
         ///
         /// In N. The paper leaves it open.
         f_max: f64 = 10.0, "f_max_n" [N, 1e-6, 1e6];
-        /// Width of the sigmoid.
+        /// Width of the sigmoid of Eq 3.
         ///
         /// In m.
         h_min: f64 = 0.5, "h_min_mm" [MM, 1e-9, 1e6];
-        /// Shift of the sigmoid.
+        /// Shift of the sigmoid of Eq 3.
         delta: f64 = 5.0, "delta" [ONE, -50, 50];
     }
 }

@@ -11,17 +11,17 @@ parameters! {
     /// Residual uncertainty of the calibration; standard deviations.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct CalibrationParams in "uncertainty" {
-        /// What is left after calibrating the radius of the tip; it averages out in no number of
-        /// touches, and twice of it is in each diameter and width.
+        /// Standard uncertainty of the calibrated radius of the tip; more touches do not reduce it,
+        /// and each diameter and width contains it twice.
         ///
         /// In m. A ball of ruby is round within 0.2 µm, and its radius is calibrated within one.
         radius: f64 = 0.001, "radius_sigma_mm" [MM, 0, 1000];
-        /// What is left after calibrating the centre of the tip and the frame of the scan, along
-        /// each axis; it averages out in no number of touches, and is in each place and in no size.
+        /// Standard uncertainty of the calibrated centre of the tip and frame of the scan, along
+        /// each axis; more touches do not reduce it, and each place contains it, but no size does.
         ///
         /// In m. A gauge block gives the centre within a few µm.
         place: f64 = 0.002, "place_sigma_mm" [MM, 0, 1000];
-        /// What is left after calibrating the stiffness of the tip.
+        /// Standard uncertainty of the calibrated stiffness of the tip.
         ///
         /// As a share. A weight of 1 N that bends a stylus by 50 µm, read within 1 µm.
         stiffness_share: f64 = 2.0, "stiffness_percent" [PERCENT, 0, 100];
@@ -34,8 +34,7 @@ parameters! {
     pub struct UncertaintyParams in "uncertainty" {
         /// Standard deviation of a vertex of the scan, m; 0: free of noise.
         scan: f64 = 0.0;
-        /// A contact that contradicts by more than this many standard deviations is rejected as an
-        /// outlier.
+        /// Contradiction in standard deviations above which a contact is rejected as an outlier.
         gate_sigmas: f64 = 4.0, "gate_sigmas" [SIGMAS, 0.5, 1e6];
     }
     with {

@@ -54,9 +54,9 @@ parameters! {
     /// Resolution of the reconstructed surface.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct PatchParams in "patch" {
-        /// How far the new faces may be from the surface that the touches show, on planes and down
-        /// to holes twice as wide as the tip: a smaller one makes finer faces at edges and in
-        /// holes, and takes longer. Left out: 1/64 of the radius of the tip.
+        /// Largest distance of the new faces from the touched surface, on planes and in holes down
+        /// to twice the width of the tip: a smaller one makes finer faces at edges and in holes,
+        /// and takes longer. Left out: 1/64 of the radius of the tip.
         ///
         /// In m.
         tolerance: Option<f64> = None, "tolerance_mm" [MM, 1e-6, 100] like "0.02";

@@ -87,18 +87,18 @@ parameters! {
     /// Settings of a [`MarkerFilter`].
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct MarkerParams in "markers" {
-        /// Noise of a marker per axis.
+        /// Standard deviation of the noise of a marker along each axis.
         ///
         /// In m: markers much farther from the fit count little. An active LED system at 2 m.
         noise: f64 = 0.15, "noise_mm" [MM, 1e-6, 1000];
-        /// A marker farther than this from where it is expected is another one, or none; less than
-        /// half of the smallest distance between two markers.
+        /// Largest distance of a marker from its expected position; a farther one does not count as
+        /// this marker. Less than half of the smallest distance between two markers.
         ///
         /// In m. A hand that accelerates with 5 m/s² strays by 2 mm in 30 ms, and the distance
         /// between markers is more than twice that.
         gate: f64 = 4.0, "gate_mm" [MM, 1e-6, 1000];
-        /// How long the body flies on when its markers do not determine it; after that there is no
-        /// pose.
+        /// Longest time for which the body continues its motion while its markers do not determine
+        /// it; after that there is no pose.
         ///
         /// In ns. As long as [`super::SyncParams::largest_gap_ns`] and for the same reason.
         coast_ns: i64 = 30.0, "coast_ms" [MS, 0.001, 10000];
@@ -106,13 +106,13 @@ parameters! {
         ///
         /// In ns.
         period_ns: i64 = 1.0, "period_ms" [MS, 0.05, 10000];
-        /// How far a frame may lag behind the newest one.
+        /// Largest lag of a frame behind the newest one.
         ///
         /// In ns.
         reorder_ns: i64 = 20.0, "reorder_ms" [MS, 0, 60000];
     }
     with {
-        /// How the body follows its markers.
+        /// Springs between the body and its markers.
         spring: SpringParams,
     }
 }

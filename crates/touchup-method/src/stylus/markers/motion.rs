@@ -19,13 +19,13 @@ parameters! {
     /// Spring and damper at each marker, for the mass at it.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct SpringParams in "markers" {
-        /// Natural frequency √(k/m) / 2π of the springs between the body and its markers: higher
-        /// follows faster, lower smooths more.
+        /// Natural frequency √(k/m) / 2π of the springs between the body and its markers: a higher
+        /// one follows faster, a lower one smooths more.
         ///
         /// In Hz. Behind a hand that accelerates by 1 m/s² the body lags by 0.2 mm, and the noise
         /// of frames at 200 Hz falls to two thirds.
         frequency: f64 = 12.0, "spring_hz" [HZ, 0.001, 1e6];
-        /// Damping d / (2 √(k m)): 1 is the fastest that does not swing.
+        /// Damping ratio d / (2 √(k m)): 1 is the fastest without oscillation.
         damping: f64 = 1.0, "damping" [ONE, 0.5, 100];
     }
 }
