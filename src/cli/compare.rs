@@ -103,11 +103,11 @@ enum Align {
     /// MESH is already aligned
     #[default]
     None,
-    /// Point to plane, from roughly the right place
+    /// Point to plane, from an approximate alignment
     Icp,
-    /// From anywhere, by holes, slots, corners and planes, then point to plane
+    /// Holes, slots, corners and planes, from any start, then point to plane
     Features,
-    /// By picked point pairs, in the file PAIRS
+    /// Picked point pairs of the file PAIRS
     Pairs,
 }
 

@@ -74,7 +74,7 @@ const EXIT_CODES: &str = "Exit codes: 0 done, 1 result not written, 2 wrong usag
                           4 done with losses (named on stderr), 5 the arm stopped, 130 a signal stopped it";
 
 const ARM_SIGNALS: &str = "\
-Ctrl-C (or SIGTERM) stops the arm and retracts it; a second one has it stay where it is. What was measured is kept.
+Ctrl-C (or SIGTERM) stops the arm and retracts it; a second one stops it in place. The measurements made until then stay.
 
 Exit codes: 0 all as asked, 1 no result, 2 wrong usage, 3 bad input file, 4 not found, or not within tolerance or gate (named on stderr), \
 5 the arm stopped, 130 a signal stopped it.";
@@ -87,7 +87,7 @@ linear spring. Out, in the same order: {\"b_m\",\"n\"} with 17 digits, or {\"err
 #[cfg(any(feature = "ros", feature = "r2r"))]
 const ROS_ARGUMENTS: &str = "\
 Behind --ros-args: -p NAME:=VALUE, --params-file FILE, -r FROM:=TO, -r __ns:=/NAMESPACE, --log-level LEVEL. ROS_DOMAIN_ID and
-ROS_AUTOMATIC_DISCOVERY_RANGE are heeded. Topics, services and parameters: docs/ros.md.";
+ROS_AUTOMATIC_DISCOVERY_RANGE apply. Topics, services and parameters: docs/ros.md.";
 
 #[derive(Debug, Subcommand)]
 enum Verb {
@@ -122,7 +122,7 @@ enum Verb {
     /// Checks the repeatability of an arm on one spot
     #[command(after_help = ARM_SIGNALS)]
     Check(check::CheckArguments),
-    /// Acknowledges the stop of an arm after inspection, so that it can move again; nothing moves
+    /// Acknowledges the stop of an arm after inspection, so that it can move again; moves nothing
     Recover(recover::RecoverArguments),
     /// Scans and touches a known part: makes the input of refine
     Simulate(simulate::SimulateArguments),

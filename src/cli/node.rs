@@ -39,8 +39,8 @@ pub(super) struct NodeArguments {
     tip_radius_mm: Option<f64>,
     #[command(flatten)]
     web: WebFlags,
-    /// Folder of the scans on offer on the page if none is named, and of the page's scans and
-    /// scene.yaml; default: the current folder
+    /// Folder of the page: scans to choose from if none is named, uploaded scans and scene.yaml;
+    /// default: the current folder
     #[arg(long, value_name = "FOLDER", requires = "web")]
     web_scans: Option<PathBuf>,
     /// Prints the report of the session as one JSON object

@@ -39,15 +39,15 @@ pub(super) struct ProbeArguments {
     /// scene, mm
     #[arg(long, value_name = "T")]
     tolerance_mm: Option<f64>,
-    /// Touches until each characteristic of a drawing passes or fails, instead of until a dimension
-    /// has a tolerance
+    /// Touches until each characteristic of a drawing passes or fails, instead of until each ± is
+    /// small enough
     #[arg(long, value_name = "GOAL", value_parser = ["decided"], requires = "nominal", conflicts_with = "tolerance_mm")]
     until: Option<String>,
     /// Drawing for --until decided: nominal values and tolerances, CSV or JSON (docs/inspect.md)
     #[arg(long, value_name = "FILE", requires = "until")]
     nominal: Option<PathBuf>,
     /// Minimum probability of conformity for a pass, and of nonconformity for a fail, over all
-    /// looks together
+    /// interim decisions together
     #[arg(long, value_name = "P", default_value_t = 0.95, requires = "until")]
     confidence: f64,
     /// Maximum number of touches of a feature
@@ -67,7 +67,7 @@ pub(super) struct ProbeArguments {
     /// mesh
     #[arg(long)]
     slide: bool,
-    /// Plans, checks reach and paths, and draws the plan by the scene alone: asks and moves no arm
+    /// Plans, checks reach and paths, and draws the plan from the scene alone, without an arm
     #[arg(long)]
     dry_run: bool,
     /// Start of the ball in the plan of --dry-run, in the frame of the scan, mm; default: 40 mm
@@ -82,7 +82,7 @@ pub(super) struct ProbeArguments {
     /// Continues an interrupted probing in the folder of --out: does not repeat finished features
     #[arg(long, conflicts_with = "dry_run")]
     resume: bool,
-    /// Writes mesh and features even if part of the arm's data is surely wrong (`touchup doctor`)
+    /// Writes mesh and features despite sure findings in the arm's data (`touchup doctor`)
     #[arg(long, conflicts_with = "dry_run")]
     force: bool,
     /// Folder for plan.png, probing.json, probed_touches.jsonl, recording, probed.json,

@@ -47,14 +47,14 @@ pub(super) struct RefineArguments {
     recorded: RecordingFlags,
     #[command(flatten)]
     told: ToldFlags,
-    /// The robust method, or the published one literally
+    /// Rule of the haptic update
     #[arg(long)]
     mode: Option<Mode>,
-    /// Also estimates the rigid offset of the scan from the touched part; the scan is not moved
+    /// Also estimates the rigid offset of the scan from the touched part; does not move the scan
     #[arg(long)]
     registration: bool,
-    /// Replays in real time with the patch beside it, as next to a stylus, and reports its delay;
-    /// the result is the same
+    /// Replays in real time, with the patch beside the samples as in a live session, and reports
+    /// its delay; the result is the same
     #[arg(long)]
     live: bool,
     /// With --live: shows the replay on the operator page, and leaves out strokes undone there
@@ -69,10 +69,10 @@ pub(super) struct RefineArguments {
     #[arg(long, value_name = "TOUCHES")]
     touches_out: Option<PathBuf>,
     /// Session folder of the node, even after a crash: source of scan, scene and touches, and
-    /// target of refined.ply, features.json and touches.csv unless these have paths of their own
+    /// target of refined.ply, features.json and touches.csv unless flags give their paths
     #[arg(long, value_name = "SESSION", conflicts_with_all = ["scan", "bag", "scene", "mesh_unit", "wrench_topic", "pose_topic", "pose_frame", "markers_topic"])]
     resume: Option<PathBuf>,
-    /// Refines even if part of the recording is surely wrong (`touchup doctor`)
+    /// Refines despite sure findings in the recording (`touchup doctor`)
     #[arg(long)]
     force: bool,
     /// Undone, redone, removed and restored strokes of the session.

@@ -86,22 +86,22 @@ pub struct ReportArguments {
     /// Prints report.json instead of the verdict
     #[arg(long)]
     json: bool,
-    /// Measures against Open3D, libigl, SciPy, trimesh and scikit-learn too, which are installed
-    /// from PyPI; takes some minutes
+    /// Also measures Open3D, libigl, SciPy, trimesh and scikit-learn, installed from PyPI; takes
+    /// some minutes
     #[arg(long)]
     peers: bool,
-    /// Virtual environment for them; made where it is not there [default: peers-env in the folder
-    /// of --out]
+    /// Virtual environment for the peers, created if missing [default: peers-env in the folder of
+    /// --out]
     #[arg(long, value_name = "DIR", requires = "peers")]
     peers_env: Option<PathBuf>,
-    /// A scan to measure on beside the simulated ones: PLY, STL or OBJ, or a point cloud: PLY, PCD,
-    /// XYZ or E57
+    /// Scan to measure on beside the simulated ones: mesh (PLY, STL, OBJ) or point cloud (PLY, PCD,
+    /// XYZ, E57)
     #[arg(long, value_name = "MESH", requires_all = ["truth", "bag"])]
     scan: Option<PathBuf>,
-    /// Its true part, in the frame of the scan
+    /// True part of the scan, in the frame of the scan
     #[arg(long, value_name = "MESH", requires = "scan")]
     truth: Option<PathBuf>,
-    /// The touches on it: a ROS 2 recording with the usual topics
+    /// Recording of the touches on the scan: ROS 2, with the default topics
     #[arg(long, value_name = "RECORDING", requires = "scan")]
     bag: Option<PathBuf>,
     /// Unit of the coordinates of scan and truth
@@ -142,15 +142,15 @@ enum ReportChapter {
     WorkPrecision,
     /// Error against time of each method to refine whole scans, with two baselines
     WholeScan,
-    /// Error from sweep to sweep, and of one face over time
+    /// Error after each sweep, and of one face over time
     Convergence,
-    /// Where each integrator stays stable, and what becomes of extremes
+    /// Stability limits of each integrator, and its behaviour at extremes
     Stability,
     /// Time, allocations and memory of each stage and part
     Cost,
     /// Errors of vertices and features over their stated uncertainties, in simulated worlds
     Coverage,
-    /// What is said of wrong input, and of sound, in simulated worlds
+    /// Findings on wrong and on sound input, in simulated worlds
     Mistakes,
 }
 

@@ -52,7 +52,7 @@ pub(in crate::cli) struct PayloadArguments {
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum Axes {
-    /// The sensor's own
+    /// Axes of the sensor
     Sensor,
     /// Axes of the poses
     Pose,

@@ -19,8 +19,8 @@ const NO_SCENE: &str =
 /// Output scene and print format of a calibration.
 #[derive(Debug, Args)]
 pub(super) struct CalibrationTarget {
-    /// Scene to put the result into; all else in it stays as written. Default, also if --out names
-    /// the same new file: a whole scene with every key explained
+    /// Scene for the result; its other text stays unchanged. Default, also if --out names the same
+    /// new file: a full scene with every key explained
     #[arg(long, value_name = "YAML")]
     scene: Option<PathBuf>,
     /// Output scene; may be the same file as --scene

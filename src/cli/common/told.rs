@@ -114,7 +114,7 @@ touchup_method::names! {
         Parameter = "parameter",
         /// The scene.
         Scene = "scene",
-        /// Default of a usual cell.
+        /// Default of the program.
         Default = "default",
     }
 }

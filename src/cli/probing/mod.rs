@@ -49,7 +49,7 @@ pub(super) struct Probing<'a> {
     pub flags: &'a [Flag],
     /// Whether the arm is simulated and waits for viewers, unlike a real one.
     pub is_simulated: bool,
-    /// Whether to write the mesh even if some input is surely wrong.
+    /// Whether to write the mesh despite sure findings.
     pub is_forced: bool,
     pub out: &'a Path,
 }

@@ -48,11 +48,11 @@ touchup_method::names! {
     /// Source of a message's time of measurement.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
     pub enum StampSource {
-        /// The stamp of its header.
+        /// Stamp of the header.
         #[default]
         Header = "header",
-        /// When the recorder took it: for headers without a stamp, or of clocks that have nothing
-        /// in common. Both streams are as late then as their way to the recorder was long.
+        /// Time of recording: for headers without a stamp, or with stamps of unrelated clocks. Each
+        /// stream is then late by its delay to the recorder.
         Log = "log",
     }
 }
