@@ -1,11 +1,11 @@
-"""A cell: the node, the frames of its scene, and RViz where it is installed.
+"""A cell: the node, the frames of its scene, and RViz if installed.
 
     ros2 launch touchup cell.launch.py scan:=part.ply tip_radius_mm:=1.5
     ros2 launch touchup cell.launch.py scan:=part.ply robot:=ur ur_type:=ur5e source:=probe scene:=cell.yaml
 
 The hand stylus, or the arm of somebody else with the probe, publishes wrench and pose; with robot:=sim or robot:=ur the
-node does. Everything runs in `namespace`. Who touches, who moves, the scene and the radius of the ball come from here, as the frames depend
-on them; the scene or `tip_radius_mm` tells the radius. Other parameters come from the file `params` unless they are given here.
+node does. Everything runs in `namespace`. The frames depend on source, robot, scene and radius of the ball, so these come from here, the
+radius from the scene or `tip_radius_mm`. Other parameters come from the file `params` unless they are given here.
 """
 
 import os
@@ -23,7 +23,7 @@ NO_RADIUS = "the radius of the ball is not known: give tip_radius_mm:=R, or a sc
 
 
 def path(*below):
-    """Absolute path of what is installed with touchup."""
+    """Absolute path of a file installed with touchup."""
     return os.path.join(get_package_share_directory("touchup"), *below)
 
 
@@ -42,7 +42,7 @@ def absolute(given):
 
 
 def text(value):
-    """A parameter that is text, even where it looks like a number."""
+    """A parameter that is text, even if it looks like a number."""
     return ParameterValue(value, value_type=str)
 
 
@@ -60,7 +60,7 @@ def frames(name, arguments, common):
 
 
 def actions(context):
-    """What the arguments ask for."""
+    """Actions of the arguments."""
     given = lambda name: LaunchConfiguration(name).perform(context)  # noqa: E731
     # an empty namespace is refused where none is not
     common = {"namespace": given("namespace") or None, "use_sim_time": given("use_sim_time") == "true"}
@@ -122,30 +122,30 @@ def actions(context):
 
 
 def generate_launch_description():
-    """The arguments, and what follows from them."""
+    """The arguments and their actions."""
     argument = DeclareLaunchArgument
     yes_no = ["true", "false"]
     return LaunchDescription(
         [
-            argument("robot", default_value="none", choices=["none", "sim", "ur"], description="Who moves the probe."),
-            argument("sim_part", default_value="", description="With robot:=sim: the part as it is, a mesh."),
+            argument("robot", default_value="none", choices=["none", "sim", "ur"], description="Kind of arm."),
+            argument("sim_part", default_value="", description="True part for robot:=sim, a mesh."),
             argument(
-                "allow_motion", default_value="", choices=["", *yes_no], description="Whether the arm may move; empty: as in params."
+                "allow_motion", default_value="", choices=["", *yes_no], description="Permission to move the arm; empty: as in params."
             ),
-            argument("source", default_value="stylus", choices=["stylus", "probe"], description="Who touches."),
-            argument("scan", default_value="", description="The mesh to refine: PLY, STL or OBJ."),
-            argument("mesh_unit", default_value="", choices=["", "m", "mm", "inch"], description="Unit of its file."),
-            argument("scene", default_value="", description="The scene YAML; empty: the usual one."),
-            argument("tip_radius_mm", default_value="", description="Radius of the ball, mm; needed where no scene names it."),
+            argument("source", default_value="stylus", choices=["stylus", "probe"], description="Touching tool."),
+            argument("scan", default_value="", description="Mesh to refine: PLY, STL or OBJ."),
+            argument("mesh_unit", default_value="", choices=["", "m", "mm", "inch"], description="Unit of the file of scan."),
+            argument("scene", default_value="", description="Scene, YAML; empty: config/default.yaml."),
+            argument("tip_radius_mm", default_value="", description="Radius of the ball, mm; required if no scene names it."),
             argument("params", default_value="", description="Parameters of the node; empty: config/node.yaml."),
-            argument("rviz", default_value="auto", choices=["auto", *yes_no], description="Start RViz; auto: where it is installed."),
+            argument("rviz", default_value="auto", choices=["auto", *yes_no], description="Start RViz; auto: if installed."),
             argument("namespace", default_value="", description="Namespace of the node and of RViz."),
             argument("use_sim_time", default_value="false", choices=yes_no, description="Time from /clock."),
-            argument("ur_type", default_value="ur5e", description="With robot:=ur: which arm, as ur_description names it."),
-            argument("robot_xyz", default_value="", description="Its base_link in the cell, m; empty: 0 0 0."),
-            argument("robot_rpy", default_value="", description="... rad; empty: 0 0 0."),
-            argument("tcp_xyz", default_value="", description="Its tool centre point from tool0, m; empty: 0 0 0."),
-            argument("tcp_rpy", default_value="", description="... rad; empty: pi 0 0, z from tip to handle."),
+            argument("ur_type", default_value="ur5e", description="Model of the arm with robot:=ur, as in ur_description."),
+            argument("robot_xyz", default_value="", description="Position of its base_link in the cell, m; empty: 0 0 0."),
+            argument("robot_rpy", default_value="", description="Orientation of its base_link in the cell, rad; empty: 0 0 0."),
+            argument("tcp_xyz", default_value="", description="Position of its tool centre point from tool0, m; empty: 0 0 0."),
+            argument("tcp_rpy", default_value="", description="Orientation of that point, rad; empty: pi 0 0, z from tip to handle."),
             OpaqueFunction(function=actions),
         ]
     )

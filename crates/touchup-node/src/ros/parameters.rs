@@ -149,12 +149,12 @@ pub const PARAMETERS: &[ParameterDescriptor] = {
         fixed(
             "scene",
             String(""),
-            "the scene; empty: that of config/default.yaml",
+            "scene; empty: that of config/default.yaml",
         ),
         fixed(
             "scan",
             String(""),
-            "the mesh to be refined; empty: the one that the scene names",
+            "mesh to refine; empty: the one that the scene names",
         ),
         fixed(
             "tip_radius_mm",
@@ -164,23 +164,23 @@ pub const PARAMETERS: &[ParameterDescriptor] = {
         fixed(
             "mesh_unit",
             OneOf("mm", MeshUnit::WORDS),
-            "unit of its coordinates",
+            "unit of the scan",
         ),
         fixed(
             "source",
             OneOf("stylus", &["stylus", "probe"]),
-            "who touches",
+            "touching tool",
         ),
         fixed(
             "session_folder",
             String("sessions"),
-            "where sessions go, each in a folder of its own",
+            "parent folder of the session folders",
         ),
         fixed("object_frame", String("object"), "frame of the mesh"),
         fixed(
             "tool_frame",
             String(""),
-            "frame whose pose comes; empty: as source",
+            "tracked frame; empty: the name of source",
         ),
         fixed(
             "pose_type",
@@ -195,22 +195,22 @@ pub const PARAMETERS: &[ParameterDescriptor] = {
         fixed(
             "pose_frame",
             String(""),
-            "whose pose is taken from /tf, as tool0 or tool0 in base; empty: of a topic",
+            "frame of the pose in /tf, as tool0 or tool0 in base; empty: pose by a topic",
         ),
         live(
             "view_rate_hz",
             Double(20.0, 0.1, 100.0),
-            "tiles and tip markers",
+            "rate of tiles and tip markers",
         ),
         live(
             "features_rate_hz",
             Double(5.0, 0.1, 100.0),
-            "features while they change",
+            "rate of features while they change",
         ),
         live(
             "mismatch_rate_hz",
             Double(0.0, 0.0, 10_000.0),
-            "at most; 0: every sample",
+            "largest rate of mismatch; 0: every sample",
         ),
         live(
             "colour_by",
@@ -220,44 +220,36 @@ pub const PARAMETERS: &[ParameterDescriptor] = {
         live(
             "stale_ms",
             Double(100.0, 1.0, 10_000.0),
-            "a stream without a message for so long is stale",
+            "time without a message until a stream is stale",
         ),
         live(
             "flag_kind",
             OneOf("hole", &KIND_NAMES),
-            "what a clicked point flags",
+            "kind of feature that a click flags",
         ),
         live(
             "flag_radius_mm",
             Double(5.0, 0.1, 1_000.0),
-            "how far around it is looked for",
+            "search radius around the click",
         ),
         fixed(
             "robot",
             OneOf("none", &["none", "sim", "ur", "ros2_control"]),
-            "the arm",
+            "kind of arm",
         ),
-        fixed(
-            "sim_part",
-            String(""),
-            "the part as it is, which a simulated arm touches",
-        ),
+        fixed("sim_part", String(""), "true part for a simulated arm"),
         ParameterDescriptor {
             name: "allow_motion",
             allowed: Bool(false),
             settable: Settable::OnlyToFalse,
-            description: "whether it may move",
+            description: "permission for the arm to move",
         },
         fixed(
             "service_mapping",
             OneOf("enhanced", &["enhanced", "cyclone"]),
-            "header of services, as the RMW of the others has it (Fast DDS, Cyclone); not with r2r",
+            "header of services, as in the RMW of the others (Fast DDS, Cyclone); not with r2r",
         ),
-        fixed(
-            "use_sim_time",
-            Bool(false),
-            "the time is that of the topic /clock",
-        ),
+        fixed("use_sim_time", Bool(false), "time from the topic /clock"),
     ]
 };
 
