@@ -18,13 +18,13 @@ pyo3::create_exception!(
     touchup,
     TouchupError,
     PyException,
-    "What cannot be done, in the words of the command line: `kind`, `hint` and `exit_code` are those of its `--json`."
+    "Error, in the words of the command line: `kind`, `hint` and `exit_code` are those of its `--json`."
 );
 pyo3::create_exception!(
     touchup,
     TouchupWarning,
     PyUserWarning,
-    "What was done and is doubtful, or what a better input would not lack."
+    "Finding about an input, or a loss that a better input would avoid."
 );
 
 /// Maximum number of warnings per call; a last line counts the rest.

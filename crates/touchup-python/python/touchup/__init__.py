@@ -3,7 +3,7 @@
 Lengths in arrays are in m, forces in N, torques in N·m, stamps in ns; other numbers carry their unit in their name, as
 ``tip_radius_mm``. Files of meshes have no unit of their own: `unit` names it, ``"mm"`` unless you say otherwise. Frames: the
 scan's own frame is O; a pose maps the tip T (origin: centre of the ball; z: along the shaft, from tip to handle) to it.
-A wrench is what the part does to the stylus.
+A wrench is that of the part on the stylus.
 """
 
 from . import sweep

@@ -18,7 +18,7 @@ def error(message: str, kind: str = "usage", exit_code: int = 2) -> TouchupError
 
 
 def floats(given: ArrayLike, columns: int, name: str) -> NDArray[np.float64]:
-    """An array (N, `columns`) of float64; one that is that already is not copied. What is no number is refused."""
+    """Array (N, `columns`) of float64, without a copy of one of this type; refuses a value that is no number."""
     if isinstance(given, np.ma.MaskedArray) and np.ma.is_masked(given):
         raise error(f"{name} has masked values, which stand for no number: leave their rows out")
     kind = np.asarray(given).dtype

@@ -43,10 +43,10 @@ _Vector = _Floats | tuple[float, ...] | list[float]
 _Path = str | PathLike[str]
 
 class TouchupError(Exception):
-    """What cannot be done, in the words of the command line.
+    """Error, in the words of the command line.
 
     `kind`, `hint` and `exit_code` are those of its ``--json``: `kind` is ``"usage"``, ``"scene"``, ``"mesh"``, ``"recording"``,
-    ``"input"``, …; `hint` says what to do next where the message does not.
+    ``"input"`` and others; `hint` is the remedy, if the message has none.
     """
 
     kind: str
@@ -54,11 +54,11 @@ class TouchupError(Exception):
     exit_code: int
 
 class TouchupWarning(UserWarning):
-    """What was done and is doubtful, or what a better input would not lack."""
+    """Finding about an input, or a loss that a better input would avoid."""
 
 @final
 class Update:
-    """What one sample did."""
+    """Result of one sample."""
 
     @property
     def case(self) -> Literal["free", "mesh_only", "surface_only", "both"]:
@@ -66,7 +66,7 @@ class Update:
 
     @property
     def face(self) -> int | None:
-        """The face that was touched; None where there is none within reach."""
+        """The touched face; None if none is within reach."""
 
     @property
     def distance(self) -> float | None:
@@ -104,7 +104,7 @@ class Refiner:
         """Takes the next sample and moves the mesh by it.
 
         - `stamp_ns`: ns, after that of the sample before. `position`: (3,) m, centre of the ball in the frame of the scan.
-        - `orientation_xyzw`: (4,) unit quaternion of the tip. `force`: (3,) N. `torque`: (3,) N·m, zeros where it is left out.
+        - `orientation_xyzw`: (4,) unit quaternion of the tip. `force`: (3,) N. `torque`: (3,) N·m, zeros if left out.
 
         Each may be an array, a tuple or a list. Raises `TouchupError` for a sample that is not finite, absurd or not in order of
         time; it changes nothing.

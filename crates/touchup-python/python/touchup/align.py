@@ -19,7 +19,7 @@ class Alignment:
     """A rigid motion.
 
     - `matrix`: (4, 4): maps homogeneous points of the source to the target, m.
-    - `report`: `method`, `rms_mm`, `undetermined` (motions that leave the fit as it is), and what the method counts.
+    - `report`: `method`, `rms_mm`, `undetermined` (motions without effect on the fit), and the counts of the method.
     - `residuals`: (N, 3) m: of pairs, target − moved source; None for meshes.
     """
 

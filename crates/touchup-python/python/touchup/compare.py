@@ -15,17 +15,17 @@ from .mesh import Mesh, MeshLike, Unit
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """What ``touchup compare --json`` has as ``after``, and the deviation of each vertex.
+    """Deviation of each vertex, and the object ``after`` of ``touchup compare --json``.
 
     - `deviation`: (V,) m, + outside of the true part.
-    - `report`: ``regions`` is a list, the first ``"all"``, each with ``mesh_to_truth`` and others: `mean_mm`, `rms_mm`, `p95_mm`, …
+    - `report`: ``regions`` is a list, the first ``"all"``, each with ``mesh_to_truth`` and others: `mean_mm`, `rms_mm`, `p95_mm` and so on.
     """
 
     deviation: NDArray[np.float64]
     report: dict[str, Any]
 
     def region(self, name: str = "all") -> dict[str, Any]:
-        """The numbers of ``"all"``, ``"touched"``, ``"guessed"`` or ``"untouched"``; KeyError where there is no such region."""
+        """The numbers of ``"all"``, ``"touched"``, ``"guessed"`` or ``"untouched"``; KeyError without such a region."""
         found: dict[str, dict[str, Any]] = {region["region"]: region for region in self.report["regions"]}
         return found[name]
 
@@ -40,9 +40,9 @@ def compare(
     range_mm: float | None = None,
     tolerance_mm: float | None = None,
 ) -> Comparison:
-    """Measures how far `mesh` is from `truth`, region by region where it has `support`. Both are in one frame; see `align`.
+    """Measures the deviation of `mesh` from `truth`, by region if it has `support`. Both are in one frame; see `align`.
 
-    - `unit`: of the coordinates of those that are no `Mesh`.
+    - `unit`: of the coordinates, except for those of a `Mesh`.
     - `samples`: points spread over the true surface; as dense over the mesh. Another `seed` spreads them differently.
     - `range_mm`: ends of the histogram. `tolerance_mm`: deviations of at most this are within tolerance.
     """

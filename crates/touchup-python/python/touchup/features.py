@@ -27,7 +27,7 @@ class Form(TypedDict, total=False):
 
 
 class Feature(TypedDict, total=False):
-    """One feature; what does not apply to its kind, or is not known, is left out.
+    """One feature; keys that do not apply to its kind, or are unknown, are left out.
 
     Lengths in mm, angles in degrees, in the frame of the mesh. `std` has the standard uncertainties by name of the number,
     `touches` the runs of touches behind each, first and last, and `fitted_to` says whether touches or the mesh measured it.
@@ -56,7 +56,7 @@ class Feature(TypedDict, total=False):
 
 
 class Relation(TypedDict, total=False):
-    """How one touched feature lies to another: `of` and `to` are their ids."""
+    """Relation of one touched feature to another: `of` and `to` are their ids."""
 
     kind: str
     of: int
@@ -71,7 +71,7 @@ class Relation(TypedDict, total=False):
 
 
 class Features(TypedDict, total=False):
-    """What ``touchup features`` writes: the features, how they lie to one another, and the share of the area in none of them."""
+    """Object that ``touchup features`` writes: the features, their relations, and the share of the area in none of them."""
 
     features: list[Feature]
     relations: list[Relation]
@@ -81,8 +81,8 @@ class Features(TypedDict, total=False):
 def features(mesh: MeshLike, touches: Touches | None = None, *, unit: Unit = "m") -> Features:
     """Finds holes, slots, pockets, bosses, edges, corners and planes, and measures them.
 
-    - `touches`: measure what they are on, as `Refined.touches` has them; without them the mesh does.
-    - `unit`: of the coordinates of `mesh`, where it is no `Mesh`.
+    - `touches`: measure the features under them, as in `Refined.touches`; without touches the mesh does.
+    - `unit`: of the coordinates of `mesh`, unless it is a `Mesh`.
     """
     arrays = Mesh.of(mesh, unit)._arrays()
     return cast(Features, json.loads(_touchup.features(arrays, None if touches is None else touches._arrays())))

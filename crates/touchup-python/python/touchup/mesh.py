@@ -51,8 +51,8 @@ class Mesh:
 
     - `vertices`: (V, 3) float64, m.
     - `faces`: (F, 3) uint32, counter-clockwise seen from outside.
-    - `sigma`: (V,) float64, m: standard deviation of each vertex along its normal; None where it is not known.
-    - `support`: (V,) uint8: `SCAN`, `TOUCHED`, `GUESSED` or `UNREACHABLE`; None where it is not known.
+    - `sigma`: (V,) float64, m: standard deviation of each vertex along its normal; None if unknown.
+    - `support`: (V,) uint8: `SCAN`, `TOUCHED`, `GUESSED` or `UNREACHABLE`; None if unknown.
     """
 
     vertices: NDArray[np.float64]

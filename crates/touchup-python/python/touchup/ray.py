@@ -32,14 +32,14 @@ def run(
 ) -> None:
     """Runs the jobs that have no result yet, as many at a time as the cluster has CPUs.
 
-    Ray Data reads each recording once; the object store shares them and the scans, and spills what does not fit.
+    Ray Data reads each recording once; the object store shares them and the scans, and spills the excess.
 
     - `results`: the folder of the results; ``results`` beside `jobs` unless you say otherwise.
-    - `address`: of a running cluster; left out, and where Ray was not begun before, this machine alone.
-    - `max_retries`: how often a job is begun again whose worker died.
-    - `on_done`: is called after each job with how many have a result, and how many there are.
+    - `address`: of a running cluster; left out, and if Ray was not started before, this machine alone.
+    - `max_retries`: number of restarts of a job whose worker died.
+    - `on_done`: called after each job with the number of jobs with a result, and the number of all.
 
-    Raises `TouchupError` where a file is not that of the plan. A recording that cannot be refined is a result: the table says why.
+    Raises `TouchupError` for a file that differs from the plan. A recording that cannot be refined is a result: the table has the reason.
     """
     plan = Path(jobs).resolve()
     folder = plan.parent / "results" if results is None else Path(results).resolve()
@@ -80,7 +80,7 @@ def _job(plan: Path, job: int, results: Path, scan: bytes | None, recording: Pat
 
 
 def _files(rows: list[dict[str, Any]], name: str, plan: Path) -> list[Path]:
-    """What the jobs read, each once; a folder of rosbag2 is left to the job."""
+    """Files that the jobs read, each once; the job itself reads a folder of rosbag2."""
     return [path for path in {plan.parent / row[name]: None for row in rows} if path.is_file()]
 
 
@@ -102,7 +102,7 @@ def _names(table: Any) -> list[str]:
 def main() -> int:
     """``python -m touchup.ray``."""
     parser = argparse.ArgumentParser(prog="python -m touchup.ray", description="Runs the jobs of a sweep on Ray")
-    parser.add_argument("jobs", help="what touchup sweep plan wrote")
+    parser.add_argument("jobs", help="jobs, as touchup sweep plan writes them")
     parser.add_argument("--results", metavar="DIR", help="default: results beside the jobs")
     parser.add_argument("--address", help="of a running cluster; default: this machine alone")
     parser.add_argument("--max-retries", type=int, default=20, help="how often a job is begun again whose worker died (default: 20)")

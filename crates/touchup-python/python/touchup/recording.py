@@ -1,4 +1,4 @@
-"""What stylus and sensor recorded."""
+"""Recordings of stylus and sensor."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ SampleArrays = tuple[
 
 
 def recorded_as(**names: str | None) -> str:
-    """Where in a recording the poses and wrenches are, as the native half takes it."""
+    """Names of the poses and wrenches in a recording, for the native half."""
     return json.dumps({key: name for key, name in names.items() if name is not None})
 
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """Poses and wrenches, each with stamps of its own; they need not be as many.
+    """Poses and wrenches, each with stamps and a number of its own.
 
     - `pose_stamp_ns`: (N,) int64, ns. `position`: (N, 3) m: centre of the ball in the frame of the scan, or as
       `tip.offset_mm` and `scan_to_space` of the scene say. `orientation_xyzw`: (N, 4): unit quaternions x, y, z, w of the tip.
-    - `wrench_stamp_ns`: (M,) int64, ns. `force`: (M, 3) N. `torque`: (M, 3) N·m; zeros where it is left out.
+    - `wrench_stamp_ns`: (M,) int64, ns. `force`: (M, 3) N. `torque`: (M, 3) N·m; zeros if left out.
     - `wrench_frame`: ``"sensor"``: wrenches turn with the stylus; ``"object"``: they are in the axes of the poses' frame.
     """
 
@@ -99,8 +99,8 @@ class Samples:
     """Pose and wrench at the same instants, in order of time.
 
     - `stamp_ns`: (N,) int64, ns. `position`: (N, 3) m: centre of the ball in the frame of the scan.
-    - `orientation_xyzw`: (N, 4): unit quaternions of the tip; without rotation where they are left out.
-    - `force`: (N, 3) N. `torque`: (N, 3) N·m; zeros where it is left out.
+    - `orientation_xyzw`: (N, 4): unit quaternions of the tip; no rotation if left out.
+    - `force`: (N, 3) N. `torque`: (N, 3) N·m; zeros if left out.
     """
 
     stamp_ns: NDArray[np.int64]

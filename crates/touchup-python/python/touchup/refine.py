@@ -21,11 +21,11 @@ ScanLike = Union[MeshLike, Path]
 
 @dataclass(frozen=True, eq=False)
 class Refined:
-    """What came of a scan.
+    """Result of a refinement.
 
-    - `mesh`: with `sigma` and `support`, where the scene has a patch.
-    - `touches`: that features rest on.
-    - `summary`: as ``touchup refine --json`` has it: `samples`, `accepted`, `refused`, `contacts`, `moved_faces`, `friction`, `patch`,
+    - `mesh`: with `sigma` and `support` if the scene has a patch.
+    - `touches`: touches that measure the features.
+    - `summary`: object of ``touchup refine --json``: `samples`, `accepted`, `refused`, `contacts`, `moved_faces`, `friction`, `patch`,
       `uncertainty`, `findings`.
     """
 
@@ -61,9 +61,9 @@ def refine(
     - `pose_topic`, `wrench_topic`, `pose_frame`, `base_frame`, `stamp`: of a file, as of `Recording.read`. `markers_topic`: of the
       markers that give the pose.
     - `scene`: differences from the default scene; it must name the radius of the ball: ``{"tip": {"radius_mm": 1.5}}``.
-    - `force`: refines also where something of the recording is surely wrong.
+    - `force`: refines despite sure findings in the recording.
 
-    Raises `TouchupError`, and warns with `TouchupWarning` of what is doubtful. The interpreter is free for other threads meanwhile.
+    Raises `TouchupError`, and warns with `TouchupWarning` of findings and losses. The interpreter is free for other threads meanwhile.
     """
     scan_arrays, scan_file = scan_given(scan, unit)
     poses = wrenches = file = None
@@ -90,6 +90,6 @@ def scan_given(scan: ScanLike, unit: Unit | None) -> tuple[MeshArrays | None, tu
 
 
 def refined(made: dict[str, Any]) -> Refined:
-    """What the native half made."""
+    """The result of the native half."""
     mesh = Mesh(made["vertices"], made["faces"], made["sigma"], made["support"])
     return Refined(mesh, Touches(**made["touches"]), json.loads(made["summary"]))

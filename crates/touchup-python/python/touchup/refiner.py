@@ -25,13 +25,13 @@ REFUSED = 255
 
 @dataclass(frozen=True, eq=False)
 class Pushed:
-    """What became of many samples.
+    """Results of many samples.
 
     - `case`: (N,) uint8: a number of `CASES`: 0 free, 1 contact expected and not measured, 2 measured and not expected, 3 both;
       255: refused.
-    - `face`: (N,) int64: the face that was touched, −1 where there is none within reach.
-    - `distance`: (N,) m: signed distance of the ball's contact point from that face; NaN where there is none.
-    - `refused`: how many samples were refused, by reason. `first_refusal`: the first, and why.
+    - `face`: (N,) int64: the touched face; −1 if none is within reach.
+    - `distance`: (N,) m: signed distance of the ball's contact point from that face; NaN without one.
+    - `refused`: number of refused samples by reason. `first_refusal`: index and reason of the first.
     """
 
     case: NDArray[np.uint8]
@@ -43,10 +43,10 @@ class Pushed:
 
 @dataclass(frozen=True)
 class Event:
-    """What happened at a sample.
+    """Event at a sample.
 
     - `kind`: ``"contact"``: contact began; ``"lift"``: it ended; ``"refused"``: the sample was not taken.
-    - `index`, `stamp_ns`: of the sample. `face`: touched first or last; None where there is none.
+    - `index`, `stamp_ns`: of the sample. `face`: touched first or last; None without one.
     """
 
     kind: Literal["contact", "lift", "refused"]
@@ -79,20 +79,20 @@ class Refiner(_touchup.Refiner):
     ) -> Self:
         """Builds the tree over the scan.
 
-        - `scan`, `unit`, `scene`: as of `refine`. Samples are taken as they are: `sync`, `scan_to_space` and `tip.offset_mm` are for
+        - `scan`, `unit`, `scene`: as of `refine`. Samples need no conversion: `sync`, `scan_to_space` and `tip.offset_mm` are for
           recordings.
         - `wrench_frame`: ``"sensor"``: forces turn with the stylus; ``"object"``: they are in the axes of the scan.
         """
         return super().__new__(cls, *given(scene), *scan_given(scan, unit), wrench_frame)
 
     def push_many(self, samples: Samples) -> Pushed:
-        """Takes samples one after the other; a refused one is counted and changes nothing. Ctrl-C ends it between samples."""
+        """Takes samples one after the other; counts a refused one, which changes nothing. Ctrl-C ends it between samples."""
         if not isinstance(samples, Samples):
             raise error(f"samples are touchup.Samples, not {type(samples).__name__}: make them of arrays, Samples(stamp_ns, position, force)")
         return Pushed(**self._push_many(samples._arrays()))
 
     def events(self, samples: Samples, chunk: int = 1000) -> Iterator[Event]:
-        """Takes samples as `push_many`, `chunk` at a time, and yields what happens; what is not asked for is not taken."""
+        """Takes samples as `push_many`, `chunk` at a time, and yields their events; it takes samples only as the caller asks for events."""
         if chunk < 1:
             raise error(f"chunk {chunk} must be at least 1")
         for begin in range(0, len(samples), chunk):
@@ -113,20 +113,20 @@ class Refiner(_touchup.Refiner):
 
     @property
     def mesh(self) -> Mesh:
-        """A copy of the mesh as the samples so far have moved it; what was touched is reconstructed by `finish`."""
+        """Copy of the mesh, moved by the samples until now; `finish` reconstructs the touched part."""
         return Mesh(**self._mesh())
 
     @property
     def counts(self) -> dict[str, int]:
-        """What became of the samples so far, also after `finish`: `accepted`, `contacts`, `moved`, `cut_back`, `light`, `out_of_reach`, …"""
+        """Counts of the samples, also after `finish`: `accepted`, `contacts`, `moved`, `cut_back`, `light`, `out_of_reach` and others."""
         counted: dict[str, int] = json.loads(self._counts())
         return counted
 
     def finish(self, *, force: bool = False) -> Refined:
-        """Reconstructs what was touched; the refiner takes no more samples.
+        """Reconstructs the touched part; the refiner takes no more samples.
 
-        What came is judged as by `refine`: raises `TouchupError` where something is surely wrong, and warns of what is doubtful.
+        Checks the samples as `refine` does: raises `TouchupError` for a sure finding, and warns of the others.
 
-        - `force`: also where something is surely wrong, or no face of the scan was moved or replaced.
+        - `force`: also with a sure finding, or without a moved or replaced face of the scan.
         """
         return refined(self._finish(force))

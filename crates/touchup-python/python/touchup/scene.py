@@ -11,13 +11,13 @@ from ._arrays import error
 from ._scene_keys import Scene
 
 SceneLike = Union[Scene, Mapping[str, Any], str, "PathLike[str]", None]
-"""A `Scene`, or a dictionary like it; or the path of a YAML file; None: the usual one."""
+"""A `Scene`, or a dictionary like it; or the path of a YAML file; None: the default scene."""
 
 
 def default_scene() -> Scene:
-    """The usual scene: each key with its default; parts that are off, and numbers that nobody can know for you, are not there.
+    """The default scene: each key with its default, without the parts that are off and the numbers that have none.
 
-    A scene names what differs, so there is no need to begin with this one.
+    A scene names differences only, so there is no need to start from this one.
     """
     return cast(Scene, json.loads(_touchup.default_scene()))
 
@@ -38,7 +38,7 @@ def given(scene: SceneLike) -> tuple[str | None, str | None]:
         return None, fspath(scene)
     if not isinstance(scene, Mapping):
         raise error(f"a scene is a dictionary or the path of a file; a {type(scene).__name__} is neither")
-    # the text is YAML: JSON is, but for what is off
+    # the text is YAML, as is JSON; parts that are off are words
     return json.dumps({part: "off" if keys is False else _plain(keys) for part, keys in scene.items()}), None
 
 

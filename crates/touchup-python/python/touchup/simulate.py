@@ -14,10 +14,10 @@ World = Literal["workshop_stylus", "optical_tracker", "ur", "soft_probe", "carel
 
 @dataclass(frozen=True, eq=False)
 class Simulated:
-    """What scanner and stylus made of a part.
+    """Scan and touch of a part.
 
-    - `scan`: as a poor scanner has it. `recording`: poses and wrenches of a ball that slides over the part.
-    - `scene`: the text of a scene with what a calibration tells of the world; None without one.
+    - `scan`: that of a poor scanner. `recording`: poses and wrenches of a ball that slides over the part.
+    - `scene`: the text of a scene with the calibration of the world; None without a world.
     """
 
     scan: Mesh
@@ -42,12 +42,12 @@ def simulate(
 ) -> Simulated:
     """Scans and touches a part, as ``touchup simulate`` does; the same seed gives the same numbers.
 
-    - `truth`: the part, a closed mesh. `unit`: of its coordinates, where it is no `Mesh`.
-    - `world`: draws the truth of all that is not named from the ranges of this world.
-    - `told_off`: by which factor the errors of what the scene tells are larger than it says: ``"3"`` for all, ``"radius=3"`` for one.
-    - `tip_radius_mm` (1.5), `stiffness_n_per_mm` (20), `friction` (0.15), `scan_edge_mm` (2.4), `scan_noise_mm` (0.6): the truth;
-      in brackets what it is without a world.
-    - `sides`: from which the hand reaches the part: ``"x"``, ``"-x"``, ``"y"``, …
+    - `truth`: the part, a closed mesh. `unit`: of its coordinates, unless it is a `Mesh`.
+    - `world`: draws true values that are not named from the ranges of this world.
+    - `told_off`: factors of the calibration errors relative to the scene's uncertainties: ``"3"`` for all, ``"radius=3"`` for one.
+    - `tip_radius_mm` (1.5), `stiffness_n_per_mm` (20), `friction` (0.15), `scan_edge_mm` (2.4), `scan_noise_mm` (0.6): true
+      values, in brackets their defaults without a world.
+    - `sides`: sides from which the hand reaches the part: ``"x"``, ``"-x"``, ``"y"`` and so on.
     """
     made = _touchup.simulate(
         Mesh.of(truth, unit)._arrays(),

@@ -18,11 +18,11 @@ _KINDS: dict[str, Any] = {"stamp_ns": np.int64, "stroke": np.uint32, "is_rejecte
 class Touches:
     """Touches of the surface, in order of time, in the frame of the scan.
 
-    - `stamp_ns`: (N,) int64, ns. `stroke`: (N,) uint32: what was touched without a pause has one number.
+    - `stamp_ns`: (N,) int64, ns. `stroke`: (N,) uint32: number of the stroke.
     - `centre`: (N, 3) m: centre of the ball. `radius`: (N,) m. `point`: (N, 3) m: of the surface. `normal`: (N, 3): outward, unit.
-    - `sigma`, `calibration_sigma`, `place_sigma`: (N,) m: standard deviation of the centre along the normal by what averages
-      out, by the calibration of the tip, and by the place of the scan.
-    - `weight`: (N,): at most 1. `is_rejected`: (N,) bool: whether it contradicts earlier touches there.
+    - `sigma`, `calibration_sigma`, `place_sigma`: (N,) m: standard deviation of the centre along the normal due to random
+      errors, to the calibration of the tip, and to the place of the scan.
+    - `weight`: (N,): at most 1. `is_rejected`: (N,) bool: whether the touch contradicts earlier ones there.
     """
 
     stamp_ns: NDArray[np.int64]
@@ -51,7 +51,7 @@ class Touches:
         return Touches(**_touchup.read_touches(path))
 
     def write(self, path: Path) -> None:
-        """Writes that CSV; Parquet where the name ends in ``.parquet``."""
+        """Writes that CSV; Parquet if the name ends in ``.parquet``."""
         _touchup.write_touches(path, self._arrays())
 
     def _arrays(self) -> dict[str, Any]:

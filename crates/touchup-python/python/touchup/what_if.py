@@ -1,4 +1,4 @@
-"""What moved between two results of a sweep."""
+"""Differences between two results of a sweep."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from .mesh import Mesh
 
 @dataclass(frozen=True, eq=False)
 class Moved:
-    """A mesh, and how far the surface moved at each of its vertices from the first result to the second.
+    """A mesh, and the displacement of the surface at each of its vertices from the first result to the second.
 
     - `displacement`: (V,) m, along the normal; positive: outwards.
-    - `plus_minus`: (V,) m, the larger ± of both at k = 2; NaN where none is known.
+    - `plus_minus`: (V,) m, the larger ± of both at k = 2; NaN if unknown.
     """
 
     mesh: Mesh
@@ -28,16 +28,16 @@ class Moved:
 
     @property
     def moved(self) -> NDArray[np.bool_]:
-        """(V,): where it moved by more than its ±."""
+        """(V,): whether the vertex moved by more than its ±."""
         known = np.nan_to_num(self.plus_minus, nan=0.0)
         return np.asarray(np.abs(self.displacement) > known, dtype=np.bool_)
 
 
 @dataclass(frozen=True, eq=False)
 class WhatIf:
-    """What differs between two results of one scan.
+    """Differences between two results of one scan.
 
-    - `keys`: of the scene, by path, with both values. `a`, `b`: both meshes. `report`: what ``touchup whatif --json`` prints.
+    - `keys`: of the scene, by path, with both values. `a`, `b`: both meshes. `report`: object of ``touchup whatif --json``.
     """
 
     keys: dict[str, list[Any]]
@@ -47,7 +47,7 @@ class WhatIf:
 
 
 def what_if(a: str | PathLike[str], b: str | PathLike[str]) -> WhatIf:
-    """What moved from one result to another by more than either is uncertain, as ``touchup whatif`` says it.
+    """Compares two results, as ``touchup whatif`` does: displacements and features that differ by more than their ±.
 
     - `a`, `b`: folders of results of one scan, as `touchup.sweep.run_job` makes them.
     """
