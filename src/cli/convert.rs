@@ -10,6 +10,7 @@ use serde::Serialize;
 use super::common::progress::WorkProgress;
 use super::common::recorded::RecordingFlags;
 use super::{CliError, Losses, check_kept, check_outputs, check_place, counted, print_report};
+use touchup_io::atomic::has_ending;
 use touchup_io::features_file::read_features;
 use touchup_io::recording::{CopiedRecording, RecordingReader, Topics, copy_recording};
 use touchup_io::result_table::{ResultTable, is_table};
@@ -152,10 +153,7 @@ struct ConvertedTable {
 
 /// Converts features if the input is JSON, else touches.
 fn convert_results(input: &Path, out: &Path, json: bool) -> Result<Losses, CliError> {
-    let are_features = input
-        .extension()
-        .is_some_and(|ending| ending.eq_ignore_ascii_case("json"));
-    let table = match are_features {
+    let table = match has_ending(input, &["json"]) {
         true => ResultTable::of_features(&read_features(input)?.features),
         false => ResultTable::of_touches_file(input)?,
     };

@@ -8,6 +8,7 @@ use std::path::Path;
 use parquet::errors::ParquetError;
 use serde_json::{Map, Value};
 
+use crate::atomic::has_ending;
 use crate::features_file::{FeatureFile, FeatureRecord, write_features};
 use crate::file_error::{FileError, write_file};
 use crate::touches_file::{self, TouchesFileError, write_touches};
@@ -170,7 +171,7 @@ impl ResultTable {
     /// # Errors
     /// [`ResultTableError`]
     pub fn write(&self, path: &Path) -> Result<(), ResultTableError> {
-        Ok(if has_ending(path, "parquet") {
+        Ok(if has_ending(path, &["parquet"]) {
             let bytes = self.parquet()?;
             write_file(path, |out| out.write_all(&bytes))
         } else {
@@ -191,12 +192,7 @@ impl ResultTable {
 
 /// Whether the file name's ending means a table: CSV or Parquet.
 pub fn is_table(path: &Path) -> bool {
-    has_ending(path, "csv") || has_ending(path, "parquet")
-}
-
-fn has_ending(path: &Path, ending: &str) -> bool {
-    path.extension()
-        .is_some_and(|found| found.eq_ignore_ascii_case(ending))
+    has_ending(path, &["csv", "parquet"])
 }
 
 /// Writes features in the form of the ending, as a whole or not at all: a [table](is_table), else
@@ -220,7 +216,7 @@ pub fn write_touches_as_named(
     path: &Path,
     touches: &[ProbedPoint],
 ) -> Result<(), ResultTableError> {
-    match has_ending(path, "parquet") {
+    match has_ending(path, &["parquet"]) {
         true => ResultTable::of_touches(touches).write(path),
         false => Ok(write_touches(path, touches)?),
     }

@@ -9,7 +9,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use serde::Serialize;
 use tempfile::TempPath;
 
-use super::atomic::remove_left;
+use super::atomic::{has_ending, remove_left};
 use super::mesh_file::SCAN_EXTENSIONS;
 use super::recording::{is_of_recording, own_files};
 use super::session_folder::is_plain_name;
@@ -42,8 +42,7 @@ pub enum FolderFileKind {
 
 impl FolderFileKind {
     fn of_name(name: &str) -> Option<Self> {
-        let extension = Path::new(name).extension()?.to_str()?.to_ascii_lowercase();
-        let is_of = |known: &[&str]| known.contains(&extension.as_str());
+        let is_of = |known: &[&str]| has_ending(Path::new(name), known);
         if is_of(SCAN_EXTENSIONS) {
             Some(Self::Scan)
         } else if is_of(RECORDING_EXTENSIONS) {

@@ -10,6 +10,7 @@ use crate::cli::{CliError, check_outputs};
 use touchup_inspect::{
     DrawingParams, InspectionParams, InspectionSource, ReportFiles, ReportParams,
 };
+use touchup_io::atomic::has_ending;
 use touchup_io::mesh_file::MeshUnit;
 
 #[derive(Debug, Args)]
@@ -63,10 +64,7 @@ impl InspectArguments {
             self.scene.as_ref(),
         ];
         check_outputs(&outputs, &inputs, "read: choose another place")?;
-        let is_xml = qif
-            .as_ref()
-            .and_then(|path| path.extension())
-            .is_some_and(|end| end.eq_ignore_ascii_case("xml"));
+        let is_xml = qif.as_ref().is_some_and(|path| has_ending(path, &["xml"]));
         let ending = if is_xml { ".xml" } else { ".qif" };
         check_outputs(
             &[("--qif", ending, qif)],

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::super::{CliError, check_kept_by, check_place, require};
+use touchup_io::result_table::is_table;
 
 /// Jobs of a sweep, and their results.
 #[derive(Debug, Args)]
@@ -19,10 +20,8 @@ pub(super) struct SweepPlaces {
 
 /// Checks name and path of a table.
 pub(in crate::cli) fn check_table(flag: &str, path: &Path, jobs: &Path) -> Result<(), CliError> {
-    let ending = path.extension().map(|ending| ending.to_ascii_lowercase());
-    let is_table = ending.is_some_and(|ending| ending == "csv" || ending == "parquet");
     require(
-        is_table,
+        is_table(path),
         format_args!("{flag} {} must end in .csv or .parquet", path.display()),
     )?;
     check_kept_by(flag, "JSONL", jobs, path)?;

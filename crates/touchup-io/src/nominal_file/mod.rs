@@ -9,13 +9,14 @@ mod rows;
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use crate::atomic::has_ending;
+
 pub use error::NominalFileError;
 pub use record::{DatumRecord, NominalRecord, NominalTolerance};
 
 /// Whether a file holds nominal values; else it is a mesh.
 pub fn is_nominal_file(path: &Path) -> bool {
-    let ending = path.extension().map(|ending| ending.to_ascii_lowercase());
-    ending.is_some_and(|ending| ending == "csv" || ending == "json")
+    has_ending(path, &["csv", "json"])
 }
 
 /// Reads nominal values: `.json`, else a table.
@@ -23,10 +24,7 @@ pub fn is_nominal_file(path: &Path) -> bool {
 /// # Errors
 /// [`NominalFileError`]: the first fault, with its line.
 pub fn read_nominal(path: &Path) -> Result<Vec<NominalRecord>, NominalFileError> {
-    let is_json = path
-        .extension()
-        .is_some_and(|ending| ending.eq_ignore_ascii_case("json"));
-    let placed = if is_json {
+    let placed = if has_ending(path, &["json"]) {
         json::read(path)?
     } else {
         rows::read(path)?
@@ -80,10 +78,7 @@ pub fn write_nominal(
     records: &[NominalRecord],
     comment: &[&str],
 ) -> Result<(), NominalFileError> {
-    let is_json = path
-        .extension()
-        .is_some_and(|ending| ending.eq_ignore_ascii_case("json"));
-    let written = if is_json {
+    let written = if has_ending(path, &["json"]) {
         json::write(path, records)
     } else {
         rows::write(path, records, comment)

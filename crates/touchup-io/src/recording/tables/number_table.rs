@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
 
 use super::columns::{FoundColumns, OrientationColumns, ScaledColumn, TableColumns, WrenchAxes};
+use crate::atomic::has_ending;
 use crate::recording::FilePlace;
 use crate::recording::error::BadMessage;
 use crate::recording::error::Damage;
@@ -40,8 +41,7 @@ pub(in crate::recording) struct TableRow {
 
 /// Whether a file is a table by its name.
 pub(in crate::recording) fn is_table(path: &Path) -> bool {
-    let ending = path.extension().map(|ending| ending.to_ascii_lowercase());
-    path.is_file() && ending.is_some_and(|ending| ENDINGS.iter().any(|known| ending == *known))
+    path.is_file() && has_ending(path, &ENDINGS)
 }
 
 impl NumberTable {

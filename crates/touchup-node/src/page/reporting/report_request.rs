@@ -8,6 +8,7 @@ use serde::de::{MapAccess, Visitor};
 use serde::{Deserialize, Deserializer};
 
 use touchup_inspect::InspectionParams;
+use touchup_io::atomic::has_ending;
 use touchup_io::mesh_file::MeshUnit;
 use touchup_io::nominal_file::is_nominal_file;
 use touchup_io::session_folder::SessionFolder;
@@ -92,14 +93,9 @@ impl ReportRequest {
     /// In words: an unsupported file type.
     pub fn upload(&self) -> Result<(&str, u64), String> {
         let name = Path::new(&self.file);
-        let ending = name
-            .extension()
-            .map(|ending| ending.to_ascii_lowercase())
-            .unwrap_or_default();
-        let is_mesh = ["ply", "stl", "obj"].iter().any(|known| ending == *known);
         match is_nominal_file(name) {
             true => Ok((&self.file, LARGEST_TABLE)),
-            false if is_mesh => Ok((&self.file, LARGEST_MESH)),
+            false if has_ending(name, &["ply", "stl", "obj"]) => Ok((&self.file, LARGEST_MESH)),
             false => Err(format!(
                 "\"{}\": hand in nominal values as .csv or .json, or a CAD mesh as .ply, .stl or .obj",
                 self.file

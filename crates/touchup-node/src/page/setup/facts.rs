@@ -5,6 +5,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use touchup_geometry::mesh::RepairReport;
+use touchup_io::atomic::has_ending;
 use touchup_io::mesh_file::{LARGEST_M, MeshFileError, MeshUnit, SMALLEST_M};
 use touchup_session::scan::{Scan, ScanError, read_scan};
 
@@ -57,15 +58,12 @@ pub(super) fn read_facts(
     ) = read_in_any(path).map_err(|error| error.to_string())?;
     let [low, high] = mesh.bounds();
     let sides = (high - low) / unit.metres();
-    let is_e57 = path
-        .extension()
-        .is_some_and(|extension| extension.eq_ignore_ascii_case("e57"));
     Ok(ScanFacts {
         file: file.to_owned(),
         faces: mesh.face_count(),
         is_of_points: cloud.is_some(),
         repair,
-        units: choices(sides.into(), stated, is_e57),
+        units: choices(sides.into(), stated, has_ending(path, &["e57"])),
     })
 }
 
