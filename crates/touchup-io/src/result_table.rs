@@ -80,14 +80,17 @@ impl ResultTable {
     /// end in `_x`, `_y`, `_z`.
     pub fn of_features(features: &[FeatureRecord]) -> Self {
         let mut table = Self::default();
-        for feature in features {
-            // numbers and names alone cannot fail
-            let value = serde_json::to_value(feature).unwrap_or_default();
-            let mut cells = Vec::new();
-            flatten("", &value, &mut cells);
-            table.add_row(cells);
-        }
+        features
+            .iter()
+            .for_each(|feature| table.add_feature(&[], feature));
         table
+    }
+
+    /// Adds a row for a feature, behind the values `first` by their names.
+    pub fn add_feature(&mut self, first: &[(&str, Value)], feature: &FeatureRecord) {
+        // numbers and names alone cannot fail
+        let of_feature = serde_json::to_value(feature).unwrap_or_default();
+        self.add_json(&[first, &[("", of_feature)]].concat());
     }
 
     /// A row for each touch, with the columns and digits of a touches file.
@@ -121,10 +124,10 @@ impl ResultTable {
 
     /// Adds a row of values by their names, each name once; nested names as in features, `Null` is
     /// no value.
-    pub fn add_json(&mut self, row: &[(String, Value)]) {
+    pub fn add_json(&mut self, row: &[(impl AsRef<str>, Value)]) {
         let mut cells = Vec::new();
         row.iter()
-            .for_each(|(name, value)| flatten(name, value, &mut cells));
+            .for_each(|(name, value)| flatten(name.as_ref(), value, &mut cells));
         self.add_row(cells);
     }
 

@@ -43,7 +43,7 @@ fn add_vertices(table: &mut ResultTable, name: &str, mesh: &TriMesh, displaced: 
             ),
             ("moved", one.is_moved(K).into()),
         ];
-        table.add_json(&row.map(|(name, value)| (name.to_owned(), value)));
+        table.add_json(&row);
     }
 }
 
@@ -62,19 +62,9 @@ pub(super) fn features_table(found: &WhatIf) -> ResultTable {
                     .map_or(Value::Null, |center| center.to_vec().into()),
             ),
         ];
-        let named = |row: &[(&str, Value)]| {
-            row.iter()
-                .map(|(name, value)| ((*name).to_owned(), value.clone()))
-                .collect::<Vec<_>>()
-        };
         if feature.numbers.is_empty() {
-            table.add_json(
-                &[
-                    named(&of_feature),
-                    named(&[("moved", feature.is_moved().into())]),
-                ]
-                .concat(),
-            );
+            let moved = [("moved", feature.is_moved().into())];
+            table.add_json(&[&of_feature[..], &moved].concat());
         }
         for number in &feature.numbers {
             let of_number = [
@@ -85,7 +75,7 @@ pub(super) fn features_table(found: &WhatIf) -> ResultTable {
                 ("plus_minus", number.plus_minus.into()),
                 ("moved", number.moved.into()),
             ];
-            table.add_json(&[named(&of_feature), named(&of_number)].concat());
+            table.add_json(&[&of_feature[..], &of_number].concat());
         }
     }
     table

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use serde_json::{Map, Value};
+use serde_json::Value;
 
 use super::error::SweepError;
 use super::job::{Job, JobsFile};
@@ -72,15 +72,8 @@ pub fn tables_of(
         tables.jobs.add_json(&row);
         if with_features && failed.is_none() {
             for feature in read_features(&result.join(ResultFiles::FEATURES))?.features {
-                let mut row = Map::new();
-                row.insert("job".to_owned(), job.job.into());
-                row.insert("job_id".to_owned(), job.id.clone().into());
-                let mut row: Vec<_> = row.into_iter().collect();
-                // numbers and names alone cannot fail
-                if let Ok(Value::Object(of_feature)) = serde_json::to_value(&feature) {
-                    row.extend(of_feature);
-                }
-                tables.features.add_json(&row);
+                let of_job = [("job", job.job.into()), ("job_id", job.id.clone().into())];
+                tables.features.add_feature(&of_job, &feature);
             }
         }
     }
