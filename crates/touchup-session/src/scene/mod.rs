@@ -35,7 +35,7 @@ use touchup_io::text_file::read_text;
 use touchup_method::haptic::{CarveParams, GuardParams, SlidingParams};
 use touchup_method::parameters;
 use touchup_method::reconstruct::{PatchParams, UncertaintyParams};
-use touchup_method::stylus::{BiasParams, ContactGateParams, SyncParams, TipBody};
+use touchup_method::stylus::{BiasParams, ContactGateParams, SyncParams, TipBody, TipShape};
 
 parameters! {
     /// The parts of a scene. `None`: not built. Those with a default are built unless the scene
@@ -204,13 +204,11 @@ impl Scene {
     pub fn validate(&self) -> Result<(), SceneError> {
         self.check()?;
         self.check_complete()?;
-        let tip = self.tip.as_ref();
-        let shape = tip.map(|tip| tip.shape);
-        let radius = tip.map_or(0.0, |tip| tip.ball.radius);
-        TipBody::new(self.tip_shape(), radius)?;
+        let (shape, radius) = (self.tip_shape(), self.tip_params().radius);
+        TipBody::new(shape, radius)?;
         for (is_missing, needs) in [
             (
-                radius <= 0.0 && shape != Some(ShapeName::Cone),
+                radius <= 0.0 && !matches!(shape, TipShape::Cone { .. }),
                 "tip.radius_mm above 0",
             ),
             (self.contact.is_none(), "contact"),
@@ -227,9 +225,8 @@ impl Scene {
 
     /// Checks the keys that need others.
     fn check_complete(&self) -> Result<(), SceneError> {
-        let tip = self.tip.as_ref();
-        let shape = tip.map(|tip| tip.shape);
-        let radius = tip.map_or(0.0, |tip| tip.ball.radius);
+        let (shape, radius) = (self.tip_shape(), self.tip_params().radius);
+        let half_angle = self.tip.as_ref().and_then(|tip| tip.sizes.half_angle);
         let corners = self
             .scan
             .as_ref()
@@ -238,10 +235,9 @@ impl Scene {
             .refine
             .as_ref()
             .is_some_and(|it| it.contact_model == Some(ModelName::Spring));
-        let half_angle = tip.and_then(|tip| tip.sizes.half_angle);
         for (is_missing, key, needs) in [
             (
-                shape == Some(ShapeName::Cone) && half_angle.is_none(),
+                matches!(shape, TipShape::Cone { .. }) && half_angle.is_none(),
                 "tip.shape: cone",
                 "tip.half_angle_deg",
             ),
@@ -261,7 +257,7 @@ impl Scene {
                 "tip.stiffness_n_per_mm",
             ),
             (
-                self.robot.is_some() && (radius <= 0.0 || shape != Some(ShapeName::Ball)),
+                self.robot.is_some() && (radius <= 0.0 || shape != TipShape::Ball),
                 "robot",
                 "tip.shape: ball and tip.radius_mm above 0",
             ),
