@@ -68,25 +68,16 @@ pub(super) fn read_facts(
 }
 
 fn read_in_any(path: &Path) -> Result<(MeshUnit, Scan), ScanError> {
-    let mut refused = None;
-    for unit in SUGGESTED {
-        match read_scan(path, unit) {
-            Ok(scan) => return Ok((unit, scan)),
-            Err(
-                error @ ScanError::File(
-                    MeshFileError::Implausible { .. } | MeshFileError::UnitOfE57 { .. },
-                ),
-            ) => {
-                refused = Some(error);
-            }
-            Err(other) => return Err(other),
-        }
-    }
-    // the last unit's refusal, set unless a unit was plausible
-    refused.map_or_else(
-        || read_scan(path, MeshUnit::default()).map(|scan| (MeshUnit::default(), scan)),
-        Err,
-    )
+    let in_unit = |unit| read_scan(path, unit).map(|scan| (unit, scan));
+    let [first, others @ ..] = SUGGESTED;
+    others
+        .into_iter()
+        .fold(in_unit(first), |read, unit| match read {
+            Err(ScanError::File(
+                MeshFileError::Implausible { .. } | MeshFileError::UnitOfE57 { .. },
+            )) => in_unit(unit),
+            read => read,
+        })
 }
 
 /// - `sides`: in the unit of the file; `is_in_metres`: by the standard of its format.
