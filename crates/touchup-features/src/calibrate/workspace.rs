@@ -93,7 +93,6 @@ const LINE_SHARE: f64 = 0.02;
 ///
 /// # Errors
 /// [`WorkspaceError`]
-#[expect(clippy::too_many_lines)]
 pub fn check_workspace(
     spheres: &[ReferenceSphere],
     readings: &[SphereReading],
@@ -115,49 +114,9 @@ pub fn check_workspace(
     let squares: f64 = fits.iter().map(|fit| fit.residual_square).sum();
     let repeatability = (squares / degrees_of_freedom as f64).sqrt();
 
-    let radius_of =
-        |(fit, reading): (&SphereFit, &SphereReading)| fit.radius - spheres[reading.sphere].radius;
-    let radii: Vec<f64> = fits.iter().zip(readings).map(radius_of).collect();
-    let count = radii.len() as f64;
-    let tip_radius = radii.iter().sum::<f64>() / count;
-    let by_residuals = repeatability
-        * fits
-            .iter()
-            .map(|fit| fit.cofactors[(3, 3)])
-            .sum::<f64>()
-            .sqrt()
-        / count;
-    let by_scatter = match radii.len() {
-        1 => 0.0,
-        _ => (radii.iter().map(|r| (r - tip_radius).powi(2)).sum::<f64>() / (count - 1.0) / count)
-            .sqrt(),
-    };
-    let tip_radius_sigma = by_residuals.max(by_scatter).hypot(diameter_sigma / 2.0);
-
-    let centres_of = |sphere: usize| {
-        let all = fits
-            .iter()
-            .zip(readings)
-            .filter(move |(_, reading)| reading.sphere == sphere);
-        all.map(|(fit, _)| fit.centre.coords)
-    };
-    let (mut places, mut turned, mut turns) = (Vec::new(), 0.0, 0);
-    for sphere in 0..spheres.len() {
-        let count = centres_of(sphere).count();
-        if count > 0 {
-            let found = mean(centres_of(sphere));
-            turned += centres_of(sphere)
-                .map(|centre| (centre - found).norm_squared())
-                .sum::<f64>();
-            turns += count - 1;
-            places.push(CheckedPlace {
-                sphere,
-                found: found.into(),
-                error: Vector3::zeros(),
-            });
-        }
-    }
-    let orientation_scatter = (turns > 0).then(|| (turned / (3 * turns) as f64).sqrt());
+    let [tip_radius, by_touches] = tip_radius_of(spheres, readings, &fits, repeatability);
+    let tip_radius_sigma = by_touches.hypot(diameter_sigma / 2.0);
+    let (mut places, orientation_scatter) = places_of(spheres, readings, &fits);
 
     let told = |place: &CheckedPlace| spheres[place.sphere].centre;
     let pairs: Vec<_> = places
@@ -193,6 +152,66 @@ pub fn check_workspace(
         growth,
         growth_degrees_of_freedom,
     })
+}
+
+/// Effective radius of the ball, m, and its standard uncertainty by the touches, m.
+fn tip_radius_of(
+    spheres: &[ReferenceSphere],
+    readings: &[SphereReading],
+    fits: &[SphereFit],
+    repeatability: f64,
+) -> [f64; 2] {
+    let radius_of =
+        |(fit, reading): (&SphereFit, &SphereReading)| fit.radius - spheres[reading.sphere].radius;
+    let radii: Vec<f64> = fits.iter().zip(readings).map(radius_of).collect();
+    let count = radii.len() as f64;
+    let tip_radius = radii.iter().sum::<f64>() / count;
+    let by_residuals = repeatability
+        * fits
+            .iter()
+            .map(|fit| fit.cofactors[(3, 3)])
+            .sum::<f64>()
+            .sqrt()
+        / count;
+    let by_scatter = match radii.len() {
+        1 => 0.0,
+        _ => (radii.iter().map(|r| (r - tip_radius).powi(2)).sum::<f64>() / (count - 1.0) / count)
+            .sqrt(),
+    };
+    [tip_radius, by_residuals.max(by_scatter)]
+}
+
+/// Each touched sphere, without its error, and the scatter of its centres over the orientations, m.
+fn places_of(
+    spheres: &[ReferenceSphere],
+    readings: &[SphereReading],
+    fits: &[SphereFit],
+) -> (Vec<CheckedPlace>, Option<f64>) {
+    let centres_of = |sphere: usize| {
+        let all = fits
+            .iter()
+            .zip(readings)
+            .filter(move |(_, reading)| reading.sphere == sphere);
+        all.map(|(fit, _)| fit.centre.coords)
+    };
+    let (mut places, mut turned, mut turns) = (Vec::new(), 0.0, 0);
+    for sphere in 0..spheres.len() {
+        let count = centres_of(sphere).count();
+        if count > 0 {
+            let found = mean(centres_of(sphere));
+            turned += centres_of(sphere)
+                .map(|centre| (centre - found).norm_squared())
+                .sum::<f64>();
+            turns += count - 1;
+            places.push(CheckedPlace {
+                sphere,
+                found: found.into(),
+                error: Vector3::zeros(),
+            });
+        }
+    }
+    let scatter = (turns > 0).then(|| (turned / (3 * turns) as f64).sqrt());
+    (places, scatter)
 }
 
 /// Number of degrees of freedom left by a rigid motion of these places.

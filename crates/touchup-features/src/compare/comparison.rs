@@ -124,6 +124,31 @@ struct RegionDeviations {
 }
 
 impl RegionDeviations {
+    /// - `corners`: vertex of the mesh near each foot on the truth.
+    fn of_feet(
+        feet: &[Foot],
+        corners: impl Iterator<Item = VertexId>,
+        regions: Regions<'_>,
+        workers: &dyn Workers,
+    ) -> Result<Self, CompareError> {
+        let on_truth: Vec<_> = feet.iter().map(|foot| foot.point).collect();
+        Ok(Self {
+            values: feet.iter().map(|foot| foot.deviation).collect(),
+            regions: regions_of(regions, corners, &on_truth, workers)?,
+        })
+    }
+
+    /// Region and deviation of each slot for a vertex; 0 without a vertex.
+    fn by_slot(&self, vertices: &[VertexId], slots: usize) -> (Vec<SupportRegion>, Vec<f64>) {
+        let (mut regions, mut deviations) =
+            (vec![SupportRegion::Untouched; slots], vec![0.0; slots]);
+        for ((vertex, region), deviation) in vertices.iter().zip(&self.regions).zip(&self.values) {
+            regions[vertex.0 as usize] = region.unwrap_or(SupportRegion::Untouched);
+            deviations[vertex.0 as usize] = *deviation;
+        }
+        (regions, deviations)
+    }
+
     fn within(&self, region: Option<SupportRegion>) -> Vec<f64> {
         let both = self.values.iter().zip(&self.regions);
         both.filter(|(_, at)| region.is_none() || region == **at)
@@ -218,7 +243,6 @@ pub fn compare(
 }
 
 /// - `samples`: of the mesh and of the truth.
-#[expect(clippy::too_many_lines)]
 fn measure(
     mesh: IndexedMesh<'_>,
     truth: IndexedMesh<'_>,
@@ -244,50 +268,24 @@ fn measure(
         feet(&vertex_points, truth, workers)?,
     );
     let truth_feet = feet(&truth_points, mesh, workers)?;
-    let deviations = |feet: &[Foot]| feet.iter().map(|foot| foot.deviation).collect::<Vec<f64>>();
-    let on_true_part = |feet: &[Foot]| feet.iter().map(|foot| foot.point).collect::<Vec<_>>();
-    let to_truth = RegionDeviations {
-        values: deviations(&mesh_feet),
-        regions: regions_of(
-            regions,
-            on_mesh.iter().map(|sample| sample.corner),
-            &on_true_part(&mesh_feet),
-            workers,
-        )?,
-    };
-    let vertices = RegionDeviations {
-        values: deviations(&vertex_feet),
-        regions: regions_of(
-            regions,
-            there.iter().copied(),
-            &on_true_part(&vertex_feet),
-            workers,
-        )?,
-    };
+    let corners = on_mesh.iter().map(|sample| sample.corner);
+    let to_truth = RegionDeviations::of_feet(&mesh_feet, corners, regions, workers)?;
+    let corners = there.iter().copied();
+    let vertices = RegionDeviations::of_feet(&vertex_feet, corners, regions, workers)?;
     let to_mesh = RegionDeviations {
         // a true point outside of the mesh is material that the mesh lacks
         values: truth_feet.iter().map(|foot| -foot.deviation).collect(),
         regions: regions_of_truth(regions, truth, on_truth, &truth_feet, mesh, reach, workers)?,
     };
-    let cloud = |points: &[_],
-                 cloud: &[_],
-                 like: &RegionDeviations|
-     -> Result<RegionDeviations, CompareError> {
-        Ok(RegionDeviations {
-            values: cloud_distances(points, cloud, workers)?,
-            regions: like.regions.clone(),
-        })
+    let cloud_to_truth = RegionDeviations {
+        values: cloud_distances(&mesh_points, &truth_points, workers)?,
+        regions: to_truth.regions.clone(),
     };
-    let cloud_to_truth = cloud(&mesh_points, &truth_points, &to_truth)?;
-    let truth_to_cloud = cloud(&truth_points, &mesh_points, &to_mesh)?;
-    let (mut of_slot, mut vertex_deviations) = (
-        vec![SupportRegion::Untouched; mesh.mesh.vertex_slots()],
-        vec![0.0; mesh.mesh.vertex_slots()],
-    );
-    for ((vertex, region), deviation) in there.iter().zip(&vertices.regions).zip(&vertices.values) {
-        of_slot[vertex.0 as usize] = region.unwrap_or(SupportRegion::Untouched);
-        vertex_deviations[vertex.0 as usize] = *deviation;
-    }
+    let truth_to_cloud = RegionDeviations {
+        values: cloud_distances(&truth_points, &mesh_points, workers)?,
+        regions: to_mesh.regions.clone(),
+    };
+    let (of_slot, vertex_deviations) = vertices.by_slot(&there, mesh.mesh.vertex_slots());
     let tilts = tilts(mesh.mesh, truth.mesh, truth.tree)?;
     let tilts = tilts
         .into_iter()

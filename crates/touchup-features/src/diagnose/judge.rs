@@ -257,35 +257,40 @@ impl InputJudge<'_> {
     }
 
     /// - `resting`: number of free samples in the mean of the rest, if there is a rest.
-    #[expect(clippy::too_many_lines)]
     fn judge_forces(
         &self,
         presses: &Presses,
         resting: Option<usize>,
         findings: &mut Vec<InputFinding>,
     ) {
-        let ForceLevels {
-            rest_t,
-            noise,
-            largest,
-        } = presses.levels;
-        let gate = self.params.gate;
-        let on = gate.map_or(0.0, |gate| gate.on);
+        let levels = &presses.levels;
+        findings.extend(self.judge_press(levels));
+        let is_unit = findings
+            .iter()
+            .any(|finding| finding.cause == InputCause::ForceUnit);
+        findings.extend(
+            resting
+                .filter(|_| !is_unit)
+                .and_then(|count| self.judge_rest(levels, count)),
+        );
+        findings.extend(self.judge_saturation(levels));
+    }
+
+    /// Presses of a size that shows another unit, or that the contact gate misses.
+    fn judge_press(&self, levels: &ForceLevels) -> Option<InputFinding> {
+        let ForceLevels { noise, largest, .. } = *levels;
+        let on = self.params.gate.map_or(0.0, |gate| gate.on);
         let bend = self
             .params
             .tip
             .stiffness
             .map_or(0.0, |stiffness| largest / stiffness);
-        if largest < LEAST_NOISE * 40.0 && noise < LEAST_NOISE {
-            let measured =
-                format!("the stylus presses with {largest:.5} N, above a noise of {noise:.6} N");
-            let remedy = "the forces look like kN: give the wrench in N";
-            findings.push(InputFinding::new(
+        let (cause, measured, remedy) = if largest < LEAST_NOISE * 40.0 && noise < LEAST_NOISE {
+            (
                 InputCause::ForceUnit,
-                true,
-                measured,
-                remedy,
-            ));
+                format!("the stylus presses with {largest:.5} N, above a noise of {noise:.6} N"),
+                "the forces look like kN: give the wrench in N",
+            )
         } else if largest > LARGEST_PRESS || largest > HARD_PRESS && bend > LARGEST_BEND {
             let mut measured =
                 format!("the stylus presses with {largest:.0} N, above a noise of {noise:.2} N");
@@ -293,61 +298,47 @@ impl InputJudge<'_> {
                 measured += &format!(", and would bend by {:.1} mm", bend * 1e3);
             }
             let remedy = "the forces look like grams or mN: give the wrench in N";
-            findings.push(InputFinding::new(
-                InputCause::ForceUnit,
-                true,
-                measured,
-                remedy,
-            ));
+            (InputCause::ForceUnit, measured, remedy)
         } else if largest < on {
             let measured = format!(
                 "the contacts reach {largest:.2} N ± {noise:.3} N and contact.on_n is {on:.2} N"
             );
             let remedy = "press harder, or give contact.on_n and contact.off_n below that and above the noise";
-            findings.push(InputFinding::new(
-                InputCause::LightTouch,
-                true,
-                measured,
-                remedy,
-            ));
-        }
-        let rest = rest_t.norm();
-        let is_unit = findings
-            .iter()
-            .any(|finding| finding.cause == InputCause::ForceUnit);
-        let is_rest = !is_unit && gate.is_some_and(|gate| rest > LARGEST_REST * gate.free);
-        if let Some(count) = resting.filter(|_| is_rest) {
-            let error = noise / (count as f64 / ALIKE).sqrt();
-            let measured = format!(
-                "far from the scan the force is ({:.2}, {:.2}, {:.2}) ± {error:.2} N in the axes of the stylus",
-                rest_t.x, rest_t.y, rest_t.z
-            );
-            findings.push(InputFinding::new(
-                InputCause::Tare,
-                rest > LEAST_TARE,
-                measured,
-                TARE_REMEDY,
-            ));
-        }
+            (InputCause::LightTouch, measured, remedy)
+        } else {
+            return None;
+        };
+        Some(InputFinding::new(cause, true, measured, remedy))
+    }
+
+    /// A force far from the scan, above the uncertainty of its zero.
+    ///
+    /// - `count`: number of free samples in the mean of the rest.
+    fn judge_rest(&self, levels: &ForceLevels, count: usize) -> Option<InputFinding> {
+        let ForceLevels { rest_t, noise, .. } = *levels;
+        let (gate, rest) = (self.params.gate?, rest_t.norm());
+        let error = noise / (count as f64 / ALIKE).sqrt();
+        let measured = format!(
+            "far from the scan the force is ({:.2}, {:.2}, {:.2}) ± {error:.2} N in the axes of the stylus",
+            rest_t.x, rest_t.y, rest_t.z
+        );
+        (rest > LARGEST_REST * gate.free)
+            .then(|| InputFinding::new(InputCause::Tare, rest > LEAST_TARE, measured, TARE_REMEDY))
+    }
+
+    /// Samples at the end of the sensor's range.
+    fn judge_saturation(&self, levels: &ForceLevels) -> Option<InputFinding> {
         let (clip, times, samples) = self.largest;
         // with repeating noise a repeated value proves nothing
-        if noise > 0.0
+        let is_saturated = levels.noise > 0.0
             && times > 20
             && times as f64 > 0.002 * samples as f64
-            && clip > 0.5 * largest
-        {
-            let measured = format!(
-                "{times} samples have a force component of exactly {clip:.3} N, the largest"
-            );
-            let remedy = "the sensor is saturated: press less, or choose a wider range";
-            let is_sure = times as f64 > 0.01 * samples as f64;
-            findings.push(InputFinding::new(
-                InputCause::Saturation,
-                is_sure,
-                measured,
-                remedy,
-            ));
-        }
+            && clip > 0.5 * levels.largest;
+        let measured =
+            format!("{times} samples have a force component of exactly {clip:.3} N, the largest");
+        let remedy = "the sensor is saturated: press less, or choose a wider range";
+        let is_sure = times as f64 > 0.01 * samples as f64;
+        is_saturated.then(|| InputFinding::new(InputCause::Saturation, is_sure, measured, remedy))
     }
 
     /// Force steps coarser than the noise, which would average them out, and than the zero's

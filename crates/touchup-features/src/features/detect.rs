@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
-use super::borders::{StraightEdge, borders, straight_edges, without_seams};
+use super::borders::{Borders, StraightEdge, borders, straight_edges, without_seams};
 use super::by_contacts::contact_heads::{Counterbore, head_of};
 use super::by_contacts::contact_slots::contact_slots;
 use super::by_contacts::contact_walls::add_contact_walls;
@@ -41,7 +41,6 @@ const OF_BALL: std::ops::Range<f64> = 0.97..1.12;
 /// number them in order of creation. A drawing keeps the order of its file.
 ///
 /// - `touches`: as in [`touchup_method::reconstruct::Patcher::probed`]; features refer to them by index.
-#[expect(clippy::too_many_lines)]
 pub fn detect(mesh: &TriMesh, touches: &[ProbedPoint]) -> Detection {
     let numbered = (!touches.is_empty()).then(|| numbered_by_place(mesh));
     let mesh = numbered.as_ref().unwrap_or(mesh);
@@ -55,12 +54,58 @@ pub fn detect(mesh: &TriMesh, touches: &[ProbedPoint]) -> Detection {
     add_cones(&mut parted, &mut walls);
     let of_face = without_seams(&parted);
     let borders = borders(&parted, &of_face);
-    let holes = holes(&parted, &walls);
-    let (mut slots, pockets) = with_felt(
+    let (slots, pockets) = with_felt(
         contact_slots(&parted, touches, &is_round),
         slots(&parted, &walls, &of_face, &borders),
     );
-    // a bore with contacts all around is no end of a slot
+    let (holes, slots) = without_ends(holes(&parted, &walls), slots, &walls);
+    let edges = sure_edges(&parted, &borders);
+    let observed = SegmentTouches::of(&parted, &of_face, touches);
+    let measure = Measure::new(&observed);
+    let mut features = hole_features(&measure, &walls, &holes, touches);
+    let bosses = bosses(&parted, &walls);
+    let is_shaft = |at: &usize| {
+        bosses.iter().all(|boss| boss.wall != *at) && is_shaft(&measure, &borders, &walls[*at])
+    };
+    let shafts: Vec<usize> = (0..walls.len()).filter(is_shaft).collect();
+    let round = round_walls(&walls, &holes, &bosses, &shafts);
+    let flat: Vec<&Slot> = slots.iter().chain(&pockets).collect();
+    let (raised, cut): (Vec<Feature>, Vec<Feature>) = of_other_outline(&measure, &round, &flat)
+        .into_iter()
+        .partition(|feature| feature.kind == FeatureKind::Boss);
+    features.extend(cut);
+    let mut features = with_heads(&measure, without_second_walls(features));
+    features.extend(slot_features(&measure, &slots, &pockets));
+    let raised = bosses
+        .iter()
+        .map(|boss| boss_feature(&measure, &walls, boss))
+        .chain(raised)
+        .collect();
+    features.extend(without_second_walls(raised));
+    features.extend(
+        shafts
+            .iter()
+            .map(|&at| cylinder_feature(&measure, &walls[at])),
+    );
+    features.extend(edges.iter().filter_map(|edge| edge_feature(&measure, edge)));
+    features.extend(corners(&parted, &measure, &edges));
+    features.extend(plane_features(&measure));
+    features
+        .iter_mut()
+        .enumerate()
+        .for_each(|(id, feature)| feature.id = id as u32);
+    Detection {
+        features,
+        unexplained: unexplained(&parted),
+    }
+}
+
+/// Holes that are no end of a slot, and slots of which no end is a bore with contacts all around.
+fn without_ends(
+    mut holes: Vec<Hole>,
+    mut slots: Vec<Slot>,
+    walls: &[Wall],
+) -> (Vec<Hole>, Vec<Slot>) {
     let felt_bores: Vec<&Wall> = holes
         .iter()
         .map(|hole| &walls[hole.wall])
@@ -71,22 +116,60 @@ pub fn detect(mesh: &TriMesh, touches: &[ProbedPoint]) -> Detection {
             .iter()
             .all(|wall| !is_slot_end(wall, std::slice::from_ref(slot)))
     });
+    holes.retain(|hole| !is_slot_end(&walls[hole.wall], &slots));
+    (holes, slots)
+}
+
+/// Straight edges between sure planes.
+fn sure_edges(parted: &SegmentedMesh, borders: &Borders) -> Vec<StraightEdge> {
     let is_sure = |edge: &StraightEdge| {
         edge.planes
             .iter()
-            .all(|&number| is_sure_plane(&parted, number))
+            .all(|&number| is_sure_plane(parted, number))
     };
-    let edges: Vec<_> = straight_edges(&parted, &borders)
+    straight_edges(parted, borders)
         .into_iter()
         .filter(is_sure)
-        .collect();
-    let holes: Vec<_> = holes
-        .into_iter()
-        .filter(|hole| !is_slot_end(&walls[hole.wall], &slots))
-        .collect();
-    let observed = SegmentTouches::of(&parted, &of_face, touches);
-    let measure = Measure::new(&observed);
+        .collect()
+}
 
+/// Walls of holes with their countersinks, then of bosses and shafts.
+fn round_walls<'a>(
+    walls: &'a [Wall],
+    holes: &[Hole],
+    bosses: &[Boss],
+    shafts: &[usize],
+) -> Vec<&'a Wall> {
+    let of_holes = holes
+        .iter()
+        .flat_map(|hole| [Some(hole.wall), hole.countersink]);
+    let of_bosses = bosses.iter().map(|boss| boss.wall);
+    of_holes
+        .flatten()
+        .chain(of_bosses)
+        .chain(shafts.iter().copied())
+        .map(|wall| &walls[wall])
+        .collect()
+}
+
+/// Large sure planes.
+fn plane_features(measure: &Measure) -> Vec<Feature> {
+    let parted = measure.observed.parted;
+    let is_large = |number: usize| parted.is_large(parted.segment(number).area);
+    parted
+        .planes()
+        .filter(|&(number, ..)| is_sure_plane(parted, number) && is_large(number))
+        .filter_map(|(number, ..)| plane_feature(measure, number))
+        .collect()
+}
+
+/// Holes by their walls, then by their rims alone.
+fn hole_features(
+    measure: &Measure,
+    walls: &[Wall],
+    holes: &[Hole],
+    touches: &[ProbedPoint],
+) -> Vec<Feature> {
     // an untouched wall of the ball's own width is the path of the ball through an unscanned region
     let of_ball = touches
         .iter()
@@ -102,80 +185,46 @@ pub fn detect(mesh: &TriMesh, touches: &[ProbedPoint]) -> Detection {
             && OF_BALL.contains(&(width / of_ball))
     };
     let mut features = Vec::new();
-    for (hole, group) in holes.iter().zip(groups(&walls, &holes)) {
+    for (hole, group) in holes.iter().zip(groups(walls, holes)) {
         features.push(Feature {
             group,
-            ..hole_feature(&measure, &walls, hole)
+            ..hole_feature(measure, walls, hole)
         });
     }
     let is_new = |rim: &RoundOpening| holes.iter().all(|hole| !is_rim_of(&walls[hole.wall], rim));
     features.extend(
-        rims(&parted)
+        rims(measure.observed.parted)
             .iter()
             .filter(|rim| is_new(rim))
-            .map(|rim| rim_feature(&measure, rim)),
+            .map(|rim| rim_feature(measure, rim)),
     );
     features.retain(|feature| !is_way_of_ball(feature));
-    let bosses = bosses(&parted, &walls);
-    let is_shaft = |at: &usize| {
-        bosses.iter().all(|boss| boss.wall != *at) && is_shaft(&measure, &borders, &walls[*at])
-    };
-    let shafts: Vec<usize> = (0..walls.len()).filter(is_shaft).collect();
-    let of_holes = holes
-        .iter()
-        .flat_map(|hole| [Some(hole.wall), hole.countersink]);
-    let of_bosses = bosses.iter().map(|boss| boss.wall).chain(shafts.clone());
-    let round: Vec<&Wall> = of_holes
-        .flatten()
-        .chain(of_bosses)
-        .map(|wall| &walls[wall])
-        .collect();
-    let flat: Vec<&Slot> = slots.iter().chain(&pockets).collect();
-    let (raised, cut): (Vec<Feature>, Vec<Feature>) = of_other_outline(&measure, &round, &flat)
-        .into_iter()
-        .partition(|feature| feature.kind == FeatureKind::Boss);
-    features.extend(cut);
-    let mut features = with_heads(&measure, without_second_walls(features));
+    features
+}
+
+/// Slots, then pockets.
+fn slot_features(measure: &Measure, slots: &[Slot], pockets: &[Slot]) -> Vec<Feature> {
     let is_reported = |slot: &Slot, feature: &Feature| {
         // in a measured mesh a void open all around may be a gap between pieces
         let is_shut = slot.floor.is_some() || slot.is_closed;
-        is_shut || parted.rounding.is_some() || feature.fitted_to == FittedTo::Touches
+        is_shut
+            || measure.observed.parted.rounding.is_some()
+            || feature.fitted_to == FittedTo::Touches
     };
     let measured = slots
         .iter()
-        .map(|slot| (slot, slot_feature(&measure, slot, FeatureKind::Slot)));
-    features.extend(
-        measured
-            .filter(|(slot, feature)| is_reported(slot, feature))
-            .map(|(_, feature)| feature),
-    );
-    features.extend(
-        pockets
-            .iter()
-            .map(|pocket| slot_feature(&measure, pocket, FeatureKind::Pocket)),
-    );
-    let raised = bosses
+        .map(|slot| (slot, slot_feature(measure, slot, FeatureKind::Slot)));
+    let measured = measured
+        .filter(|(slot, feature)| is_reported(slot, feature))
+        .map(|(_, feature)| feature);
+    let pockets = pockets
         .iter()
-        .map(|boss| boss_feature(&measure, &walls, boss))
-        .chain(raised)
-        .collect();
-    features.extend(without_second_walls(raised));
-    features.extend(
-        shafts
-            .iter()
-            .map(|&at| cylinder_feature(&measure, &walls[at])),
-    );
-    features.extend(edges.iter().filter_map(|edge| edge_feature(&measure, edge)));
-    features.extend(corners(&parted, &measure, &edges));
-    let is_large = |number: usize| parted.is_large(parted.segment(number).area);
-    let planes = parted
-        .planes()
-        .filter(|&(number, ..)| is_sure_plane(&parted, number) && is_large(number));
-    features.extend(planes.filter_map(|(number, ..)| plane_feature(&measure, number)));
-    features
-        .iter_mut()
-        .enumerate()
-        .for_each(|(id, feature)| feature.id = id as u32);
+        .map(|pocket| slot_feature(measure, pocket, FeatureKind::Pocket));
+    measured.chain(pockets).collect()
+}
+
+/// Share of the area of a mesh in no segment.
+fn unexplained(parted: &SegmentedMesh) -> f64 {
     let all: f64 = parted.facets.areas.iter().sum();
     let explained: f64 = parted
         .segmentation
@@ -183,13 +232,10 @@ pub fn detect(mesh: &TriMesh, touches: &[ProbedPoint]) -> Detection {
         .iter()
         .map(|segment| segment.area)
         .sum();
-    Detection {
-        features,
-        unexplained: if all > 0.0 {
-            (1.0 - explained / all).max(0.0)
-        } else {
-            0.0
-        },
+    if all > 0.0 {
+        (1.0 - explained / all).max(0.0)
+    } else {
+        0.0
     }
 }
 
@@ -615,11 +661,9 @@ fn of_other_outline(measure: &Measure, round: &[&Wall], flat: &[&Slot]) -> Vec<F
     }
     let mut is_known = vec![false; parted.segmentation.segments.len()];
     let of_round = round.iter().flat_map(|wall| wall.segments.iter().copied());
-    let ends = flat.iter().flat_map(|slot| slot.ends.into_iter().flatten());
-    let of_flat = flat.iter().flat_map(|slot| slot.walls.iter().copied());
+    let of_flat = flat.iter().flat_map(|slot| slot.segments());
     of_round
         .chain(of_flat)
-        .chain(ends)
         .for_each(|number| is_known[number] = true);
     let is_new = |outline: &OpeningOutline| {
         let (rim, radius) = (&outline.rim, outline.rim.fit.surface.radius);
@@ -698,7 +742,23 @@ fn cylinder_feature(measure: &Measure, wall: &Wall) -> Feature {
     }
 }
 
-#[expect(clippy::too_many_lines)]
+/// Touched share of both sides of a slot.
+///
+/// - `across`, `half`: from the middle to one side, and to one end, m.
+fn touched_sides(
+    measure: &Measure,
+    middle: &Point3<f64>,
+    across: &Vector3<f64>,
+    half: &Vector3<f64>,
+) -> f64 {
+    let side = |sign: f64| [-*half, *half].map(|end| middle + across * sign + end);
+    [1.0, -1.0]
+        .iter()
+        .map(|&sign| measure.observed.touched_along(&side(sign)))
+        .sum::<f64>()
+        / 2.0
+}
+
 fn slot_feature(measure: &Measure, slot: &Slot, kind: FeatureKind) -> Feature {
     let fitted = measure.stadium(slot);
     let axis = fitted.axis(&slot.out);
@@ -733,16 +793,13 @@ fn slot_feature(measure: &Measure, slot: &Slot, kind: FeatureKind) -> Feature {
     };
     let half = direction * (length / 2.0);
     let touched = if slot.walls.is_empty() {
-        let (middle, across) = (
-            near - axis.value * (slot.depth / 2.0),
-            axis.value.cross(&direction) * (slot.width / 2.0),
-        );
-        let side = |sign: f64| [-half, half].map(|end| middle + across * sign + end);
-        [1.0, -1.0]
-            .iter()
-            .map(|&sign| measure.observed.touched_along(&side(sign)))
-            .sum::<f64>()
-            / 2.0
+        let across = axis.value.cross(&direction) * (slot.width / 2.0);
+        touched_sides(
+            measure,
+            &(near - axis.value * (slot.depth / 2.0)),
+            &across,
+            &half,
+        )
     } else {
         measure.observed.touched_share(&slot.walls)
     };
@@ -751,12 +808,7 @@ fn slot_feature(measure: &Measure, slot: &Slot, kind: FeatureKind) -> Feature {
     } else {
         extent(measure, &fitted, &opening, &floor, &axis.value)
     };
-    let segments: Vec<usize> = slot
-        .walls
-        .iter()
-        .copied()
-        .chain(slot.ends.into_iter().flatten())
-        .collect();
+    let segments: Vec<usize> = slot.segments().collect();
     Feature {
         facets: measure.facets(&fitted.surface, &segments),
         direction: Some(direction),

@@ -6,9 +6,10 @@ use nalgebra::{Point3, Vector3};
 
 use super::borders::{Borders, is_convex};
 use super::fit::{Ends, Plane, SurfaceModel};
+use super::segmentation::bodies::Surroundings;
 use super::segmentation::facets::NONE;
 use super::segmentation::primitive::Primitive;
-use super::segmentation::rays::RayHit;
+use super::segmentation::rays::{RayHit, Rays};
 use super::segmentation::scene::SegmentedMesh;
 use super::walls::Wall;
 use touchup_geometry::numeric::{mean, without_repeats};
@@ -53,6 +54,12 @@ pub(super) struct Slot {
 }
 
 impl Slot {
+    /// Numbers of its walls, then of its ends.
+    pub(crate) fn segments(&self) -> impl Iterator<Item = usize> {
+        let ends = self.ends.into_iter().flatten();
+        self.walls.iter().copied().chain(ends)
+    }
+
     /// Whether the middle of another void is between its walls, and both overlap over more than
     /// half of the depth of the shallower: their apparent depths may differ.
     pub(crate) fn holds(&self, other: &Self) -> bool {
@@ -172,10 +179,9 @@ fn between_round_ends(parted: &SegmentedMesh, of_face: &[u32], walls: &[Wall]) -
     slots
 }
 
-/// The slot between two half-round walls, each open towards the other.
-#[expect(clippy::too_many_lines)]
-fn slot_of_ends(parted: &SegmentedMesh, of_face: &[u32], ends: [&Wall; 2]) -> Option<Slot> {
-    let [one, other] = ends;
+/// Unit vector from one to the other of two half-round walls, each open towards the other, and the
+/// distance of their axes, m.
+fn facing_ends(one: &Wall, other: &Wall) -> Option<(Vector3<f64>, f64)> {
     let width = one.radius() + other.radius();
     let axis = one.axis;
     let is_alike = (one.radius() - other.radius()).abs() < ABOUT * width
@@ -190,9 +196,38 @@ fn slot_of_ends(parted: &SegmentedMesh, of_face: &[u32], ends: [&Wall; 2]) -> Op
     }
     let direction = apart / distance;
     let is_away = one.towards.dot(&direction) < -AWAY && other.towards.dot(&direction) > AWAY;
-    if !is_away {
-        return None;
-    }
+    is_away.then_some((direction, distance))
+}
+
+/// The opening on the side of a plane, or a cylinder, around one of two half-round walls: its
+/// outward direction, the number of that land, and the distance of its plane from `middle`, m.
+fn land_of_ends(
+    parted: &SegmentedMesh,
+    around: &Surroundings,
+    ends: [&Wall; 2],
+    middle: &Point3<f64>,
+) -> Option<(Vector3<f64>, usize, f64)> {
+    let width = ends[0].radius() + ends[1].radius();
+    let rings = [RINGS * width / 2.0];
+    [1.0, -1.0].into_iter().find_map(|sign| {
+        let out = ends[0].axis * sign;
+        ends.into_iter().find_map(|end| {
+            let t = end.ends[usize::from(end.axis.dot(&out) > 0.0)];
+            let (land, _) = parted
+                .land_around(around, &end.at(t), &out, &rings, 0.2 * width)
+                .filter(|&(_, share)| share > 0.2)?;
+            let up = parted.exit(land, middle, &out).filter(|&up| up > 0.0)?;
+            Some((out, land, up))
+        })
+    })
+}
+
+/// The slot between two half-round walls, each open towards the other.
+fn slot_of_ends(parted: &SegmentedMesh, of_face: &[u32], ends: [&Wall; 2]) -> Option<Slot> {
+    let [one, other] = ends;
+    let width = one.radius() + other.radius();
+    let axis = one.axis;
+    let (direction, distance) = facing_ends(one, other)?;
     let middle = nalgebra::center(&one.at(one.middle()), &other.at(other.middle()));
     let across = axis.cross(&direction);
     let around = parted.around(one.segments[0]);
@@ -204,31 +239,14 @@ fn slot_of_ends(parted: &SegmentedMesh, of_face: &[u32], ends: [&Wall; 2]) -> Op
     {
         return None;
     }
-    let segment_of = |met: Option<RayHit>| {
-        let number = of_face[met?.face.0 as usize];
-        (number != NONE).then_some(number as usize)
-    };
     let sides = [across, -across].map(|out| rays.first(&middle, &out, 1.2 * width));
     // a recess of another outline is wider there, or narrower
     let is_straight = |met: &RayHit| (met.distance - width / 2.0).abs() < ABOUT * width;
     if sides.iter().all(Option::is_none) || !sides.iter().flatten().all(is_straight) {
         return None;
     }
-    let sides = sides.map(segment_of);
-    let rings = [RINGS * width / 2.0];
-    // the opening is on the side of a plane, or a cylinder, around one of the ends
-    let opening = [1.0, -1.0].into_iter().find_map(|sign| {
-        let out = axis * sign;
-        ends.into_iter().find_map(|end| {
-            let t = end.ends[usize::from(end.axis.dot(&out) > 0.0)];
-            let (land, _) = parted
-                .land_around(&around, &end.at(t), &out, &rings, 0.2 * width)
-                .filter(|&(_, share)| share > 0.2)?;
-            let up = parted.exit(land, &middle, &out).filter(|&up| up > 0.0)?;
-            Some((out, land, up))
-        })
-    });
-    let (out, land, up) = opening?;
+    let sides = sides.map(|met| segment_met(of_face, met));
+    let (out, land, up) = land_of_ends(parted, &around, ends, &middle)?;
     if rays.free(&middle, &out, up + width) < up + width / 2.0 {
         return None;
     }
@@ -240,7 +258,7 @@ fn slot_of_ends(parted: &SegmentedMesh, of_face: &[u32], ends: [&Wall; 2]) -> Op
     };
     let deepest = lowest(one).max(lowest(other));
     let met = rays.first(&middle, &-out, deepest + width);
-    let floor = segment_of(met).filter(|&number| is_square(parted, number, &out));
+    let floor = segment_met(of_face, met).filter(|&number| is_square(parted, number, &out));
     let down = floor
         .and_then(|number| parted.exit(number, &middle, &-out))
         .or(met.map(|met| met.distance))
@@ -470,7 +488,65 @@ struct SlotCandidate {
     area: f64,
 }
 
-#[expect(clippy::too_many_lines)]
+/// An end of a void between two walls.
+struct VoidEnd {
+    segment: Option<usize>,
+    /// distance from the middle, m
+    distance: f64,
+    is_flat: bool,
+    /// whether a wall aslant closes it
+    is_aslant: bool,
+}
+
+impl SlotCandidate {
+    /// Distance along a direction to the nearer end of both walls, m: one of them may go on beyond
+    /// the slot.
+    fn walls_end(&self, parted: &SegmentedMesh, along: &Vector3<f64>) -> f64 {
+        let of_wall = |number: usize| {
+            let corners = parted
+                .segment(number)
+                .faces
+                .iter()
+                .flat_map(|&face| parted.facets.triangle(face));
+            corners
+                .map(|p| (p - self.middle).dot(along))
+                .fold(0.0, f64::max)
+        };
+        of_wall(self.walls[0]).min(of_wall(self.walls[1]))
+    }
+
+    /// The end along a direction.
+    fn end_along(
+        &self,
+        parted: &SegmentedMesh,
+        of_face: &[u32],
+        rays: &mut Rays,
+        along: &Vector3<f64>,
+    ) -> VoidEnd {
+        let (out, width) = (&self.out, self.width);
+        let walls_end = self.walls_end(parted, along);
+        let met = rays
+            .first(&self.middle, along, parted.diagonal)
+            .filter(|met| met.distance < walls_end + 1.5 * width);
+        let distance = met.map_or(walls_end, |met| met.distance);
+        let number = segment_met(of_face, met);
+        let is_flat = number.is_some_and(|number| is_square(parted, number, along));
+        let is_aslant = number.is_some_and(|number| is_wall_aslant(parted, number, along, out));
+        // a floor that only reaches there over a seam is no end
+        let met = number.filter(|&number| is_flat || is_round_end(parted, number, out, width));
+        let segment = met.or_else(|| {
+            let middle = self.middle + along * (distance - width / 2.0);
+            round_end_about(parted, &middle, out, width)
+        });
+        VoidEnd {
+            segment,
+            distance,
+            is_flat,
+            is_aslant,
+        }
+    }
+}
+
 fn opened(parted: &SegmentedMesh, of_face: &[u32], seen: &SlotCandidate) -> Option<Slot> {
     let SlotCandidate {
         walls,
@@ -487,56 +563,21 @@ fn opened(parted: &SegmentedMesh, of_face: &[u32], seen: &SlotCandidate) -> Opti
     if up < 0.0 || rays.free(&middle, &out, reach) < up + width / 2.0 {
         return None;
     }
-    let segment_of = |met: Option<RayHit>| {
-        met.map(|met| of_face[met.face.0 as usize])
-            .filter(|&number| number != NONE)
-            .map(|number| number as usize)
-    };
     let below = rays.first(&middle, &-out, reach);
-    let walls_end = |along: &Vector3<f64>| {
-        let of_wall = |number: usize| {
-            let corners = parted
-                .segment(number)
-                .faces
-                .iter()
-                .flat_map(|&face| parted.facets.triangle(face));
-            corners.map(|p| (p - middle).dot(along)).fold(0.0, f64::max)
-        };
-        // one of them may go on beyond the slot
-        of_wall(walls[0]).min(of_wall(walls[1]))
-    };
     // a floor far below belongs to something else
-    let deepest = walls_end(&-out) + 2.0 * width;
+    let deepest = seen.walls_end(parted, &-out) + 2.0 * width;
     let met = below.filter(|met| met.distance < deepest);
-    let flat_floor = segment_of(met).filter(|&number| is_square(parted, number, &out));
+    let flat_floor = segment_met(of_face, met).filter(|&number| is_square(parted, number, &out));
     let down = match (flat_floor, met) {
         (Some(number), _) => parted.plane(number)?.along(&middle, &-out)?,
         (None, Some(met)) => met.distance,
-        (None, None) => walls_end(&-out),
+        (None, None) => seen.walls_end(parted, &-out),
     };
     let direction = out.cross(&across).normalize();
-    let (mut ends, mut lengths, mut flat, mut is_aslant) = ([None; 2], [0.0; 2], 0, false);
-    for (at, along) in [direction, -direction].into_iter().enumerate() {
-        let met = rays
-            .first(&middle, &along, reach)
-            .filter(|met| met.distance < walls_end(&along) + 1.5 * width);
-        lengths[at] = met.map_or_else(|| walls_end(&along), |met| met.distance);
-        let number = segment_of(met);
-        let is_flat = number.is_some_and(|number| is_square(parted, number, &along));
-        flat += usize::from(is_flat);
-        is_aslant |= number.is_some_and(|number| is_wall_aslant(parted, number, &along, &out));
-        // a floor that only reaches there over a seam is no end
-        let met = number.filter(|&number| is_flat || is_round_end(parted, number, &out, width));
-        ends[at] = met.or_else(|| {
-            round_end_about(
-                parted,
-                &(middle + along * (lengths[at] - width / 2.0)),
-                &out,
-                width,
-            )
-        });
-    }
-    let centre = middle + out * up + direction * ((lengths[0] - lengths[1]) / 2.0);
+    let [one, other] =
+        [direction, -direction].map(|along| seen.end_along(parted, of_face, &mut rays, &along));
+    let ends = [one.segment, other.segment];
+    let centre = middle + out * up + direction * ((one.distance - other.distance) / 2.0);
     let is_round =
         |&number: &usize| matches!(parted.segment(number).primitive, Primitive::Cylinder(_));
     let shape = if ends.iter().flatten().any(is_round) {
@@ -552,17 +593,23 @@ fn opened(parted: &SegmentedMesh, of_face: &[u32], seen: &SlotCandidate) -> Opti
         out,
         direction,
         width,
-        length: lengths[0] + lengths[1],
+        length: one.distance + other.distance,
         depth: up + down,
         through: Some(met.is_none()),
         floor: flat_floor,
         felt_floor: Vec::new(),
         land,
-        is_boxed: flat == 2,
+        is_boxed: one.is_flat && other.is_flat,
         is_closed: ends.iter().all(Option::is_some),
-        is_aslant,
+        is_aslant: one.is_aslant || other.is_aslant,
         area,
     })
+}
+
+/// The segment met by a ray.
+fn segment_met(of_face: &[u32], met: Option<RayHit>) -> Option<usize> {
+    let number = of_face[met?.face.0 as usize];
+    (number != NONE).then_some(number as usize)
 }
 
 /// Whether a segment is a plane square to `along`.

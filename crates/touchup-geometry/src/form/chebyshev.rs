@@ -29,11 +29,106 @@ struct Inequality<const N: usize> {
     least: f64,
 }
 
+/// The equations with a largest value of 1, and 1 as the largest entry of each column.
+struct ScaledEquations<'a, const N: usize> {
+    rows: &'a [SVector<f64, N>],
+    values: &'a [f64],
+    /// largest value
+    largest: f64,
+    /// largest entry of each column; 1 for the residual itself
+    scale: SVector<f64, N>,
+}
+
+impl<'a, const N: usize> ScaledEquations<'a, N> {
+    const LAST: usize = N - 1;
+
+    fn new(rows: &'a [SVector<f64, N>], values: &'a [f64], largest: f64) -> Self {
+        let column = |j: usize| {
+            rows.iter()
+                .fold(0.0, |most: f64, row| most.max(row[j].abs()))
+        };
+        let scale = SVector::from_fn(|j, _| {
+            if j == Self::LAST {
+                1.0
+            } else {
+                column(j).max(f64::MIN_POSITIVE)
+            }
+        });
+        Self {
+            rows,
+            values,
+            largest,
+            scale,
+        }
+    }
+
+    /// a·x + t ≥ r of an equation.
+    fn upper(&self, i: usize) -> Inequality<N> {
+        Inequality {
+            row: SVector::from_fn(|j, _| {
+                if j == Self::LAST {
+                    1.0
+                } else {
+                    self.rows[i][j] / self.scale[j]
+                }
+            }),
+            least: self.values[i] / self.largest,
+        }
+    }
+
+    /// −a·x + t ≥ −r of an equation.
+    fn lower(&self, i: usize) -> Inequality<N> {
+        let Inequality { row, least } = self.upper(i);
+        Inequality {
+            row: SVector::from_fn(|j, _| if j == Self::LAST { 1.0 } else { -row[j] }),
+            least: -least,
+        }
+    }
+
+    /// The first equation, and the bound of each unknown.
+    fn first_basis(&self, aim: &SVector<f64, N>) -> [Inequality<N>; N] {
+        let first = self.upper(0);
+        std::array::from_fn(|j| {
+            if j == Self::LAST {
+                return first;
+            }
+            let side = (aim[j] - first.row[j]).signum();
+            Inequality {
+                row: SVector::from_fn(|k, _| if k == j { side } else { 0.0 }),
+                least: -BOUND,
+            }
+        })
+    }
+
+    /// The equation of the largest residual, and that residual.
+    fn worst(&self, y: &SVector<f64, N>) -> Option<(usize, f64)> {
+        let x_of = |i: usize| {
+            (0..Self::LAST)
+                .map(|j| self.rows[i][j] / self.scale[j] * y[j])
+                .sum::<f64>()
+        };
+        let residual = |i: usize| self.values[i] / self.largest - x_of(i);
+        (0..self.rows.len())
+            .map(|i| (i, residual(i)))
+            .max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
+    }
+
+    /// The unknowns of the unscaled equations.
+    fn unscaled(&self, y: &SVector<f64, N>) -> SVector<f64, N> {
+        SVector::from_fn(|j, _| {
+            if j == Self::LAST {
+                0.0
+            } else {
+                y[j] * self.largest / self.scale[j]
+            }
+        })
+    }
+}
+
 /// The x of the least largest |value − row·x|, and that residual; `None` if the exchange does not
 /// end.
 ///
 /// - `rows`: each with an unused last entry, in the place of the residual itself; x has 0 there.
-#[expect(clippy::too_many_lines)]
 pub(super) fn chebyshev<const N: usize>(
     rows: &[SVector<f64, N>],
     values: &[f64],
@@ -50,34 +145,7 @@ pub(super) fn chebyshev<const N: usize>(
     if largest == 0.0 {
         return Some((SVector::zeros(), 0.0));
     }
-    let column = |j: usize| {
-        rows.iter()
-            .fold(0.0, |most: f64, row| most.max(row[j].abs()))
-    };
-    let scale = SVector::<f64, N>::from_fn(|j, _| {
-        if j == last {
-            1.0
-        } else {
-            column(j).max(f64::MIN_POSITIVE)
-        }
-    });
-    let upper = |i: usize| Inequality {
-        row: SVector::from_fn(|j, _| {
-            if j == last {
-                1.0
-            } else {
-                rows[i][j] / scale[j]
-            }
-        }),
-        least: values[i] / largest,
-    };
-    let lower = |i: usize| {
-        let Inequality { row, least } = upper(i);
-        Inequality {
-            row: SVector::from_fn(|j, _| if j == last { 1.0 } else { -row[j] }),
-            least: -least,
-        }
-    };
+    let equations = ScaledEquations::new(rows, values, largest);
     // different entries, which break ties
     let aim = SVector::<f64, N>::from_fn(|j, _| {
         if j == last {
@@ -86,17 +154,7 @@ pub(super) fn chebyshev<const N: usize>(
             TURN * (1.0 + (j as f64 + 2.0).sqrt())
         }
     });
-    let first = upper(0);
-    let mut basis: [Inequality<N>; N] = std::array::from_fn(|j| {
-        if j == last {
-            return first;
-        }
-        let side = (aim[j] - first.row[j]).signum();
-        Inequality {
-            row: SVector::from_fn(|k, _| if k == j { side } else { 0.0 }),
-            least: -BOUND,
-        }
-    });
+    let mut basis = equations.first_basis(&aim);
     // the residual of any x is at least the best one, and t of a basis at most
     let (mut best, mut most, mut least) = (SVector::zeros(), f64::MAX, 0.0);
     for _ in 0..MOST_EXCHANGES * N {
@@ -105,29 +163,19 @@ pub(super) fn chebyshev<const N: usize>(
             break;
         };
         let y = inverse * SVector::<f64, N>::from_fn(|i, _| basis[i].least);
-        let x_of = |i: usize| (0..last).map(|j| rows[i][j] / scale[j] * y[j]).sum::<f64>();
-        let residual = |i: usize| values[i] / largest - x_of(i);
-        let worst = (0..rows.len())
-            .map(|i| (i, residual(i)))
-            .max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
+        let worst = equations.worst(&y)?;
         least = y[last].max(least);
         if worst.1.abs() < most {
             most = worst.1.abs();
-            best = SVector::from_fn(|j, _| {
-                if j == last {
-                    0.0
-                } else {
-                    y[j] * largest / scale[j]
-                }
-            });
+            best = equations.unscaled(&y);
         }
         if worst.1.abs() <= y[last] + ABOVE {
             break;
         }
         let entering = if worst.1 > 0.0 {
-            upper(worst.0)
+            equations.upper(worst.0)
         } else {
-            lower(worst.0)
+            equations.lower(worst.0)
         };
         let (shares, moves) = (inverse.tr_mul(&aim), inverse.tr_mul(&entering.row));
         let can_leave = (0..N).filter(|&i| moves[i] > LEAST_PIVOT);

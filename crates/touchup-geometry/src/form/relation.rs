@@ -377,32 +377,14 @@ mod tests {
         );
     }
 
-    /// Elements with errors as large as they state: root mean square of error over uncertainty of
-    /// each relation, for a perfect and for an imperfect one.
-    #[test]
-    #[expect(clippy::too_many_lines)]
-    fn relations_are_off_by_their_uncertainty() {
-        let plane =
-            |point: [f64; 3], normal: [f64; 3]| element(Shape::Plane, point, normal, &[point]);
-        let system = [
-            plane([0.0; 3], [0.0, 0.0, 1.0]),
-            plane([0.0; 3], [1.0, 0.0, 0.0]),
-            plane([0.0; 3], [0.0, 1.0, 0.0]),
-        ];
-        type Found = Box<dyn Fn(&[Element]) -> Option<Estimate>>;
+    type Relation = Box<dyn Fn(&[Element]) -> Option<Estimate>>;
+
+    /// Name, elements and true value of a relation.
+    type RelationCase = (&'static str, Vec<Element>, f64, Relation);
+
+    fn orientation_cases() -> Vec<RelationCase> {
         let zone: fn(&[Element]) -> Option<Estimate> = |e| Some(orientation(&e[0], &e[1])?.zone);
-        let place = |x: f64| -> Found {
-            Box::new(move |e| {
-                position(
-                    &e[0],
-                    [&e[1], &e[2], &e[3]],
-                    &Point3::new(x, 0.0, 0.0),
-                    &Vector3::z(),
-                )
-            })
-        };
-        let with_system = |bore: Element| [vec![bore], system.to_vec()].concat();
-        let cases: Vec<(&str, Vec<Element>, f64, Found)> = vec![
+        vec![
             (
                 "bore ⟂ face, 0.1°",
                 vec![bore(1.745e-3, 0.0), face()],
@@ -421,6 +403,29 @@ mod tests {
                 10e-3 * 1.745e-3,
                 Box::new(zone),
             ),
+        ]
+    }
+
+    fn location_cases() -> Vec<RelationCase> {
+        let plane =
+            |point: [f64; 3], normal: [f64; 3]| element(Shape::Plane, point, normal, &[point]);
+        let system = [
+            plane([0.0; 3], [0.0, 0.0, 1.0]),
+            plane([0.0; 3], [1.0, 0.0, 0.0]),
+            plane([0.0; 3], [0.0, 1.0, 0.0]),
+        ];
+        let place = |x: f64| -> Relation {
+            Box::new(move |e| {
+                position(
+                    &e[0],
+                    [&e[1], &e[2], &e[3]],
+                    &Point3::new(x, 0.0, 0.0),
+                    &Vector3::z(),
+                )
+            })
+        };
+        let with_system = |bore: Element| [vec![bore], system.to_vec()].concat();
+        vec![
             (
                 "coaxial, 30 µm off",
                 vec![bore(0.0, 30e-6), bore(0.0, 0.0)],
@@ -451,8 +456,15 @@ mod tests {
                 100e-6,
                 place(0.02),
             ),
-        ];
+        ]
+    }
+
+    /// Elements with errors as large as they state: root mean square of error over uncertainty of
+    /// each relation, for a perfect and for an imperfect one.
+    #[test]
+    fn relations_are_off_by_their_uncertainty() {
         let mut rng = rand_pcg::Pcg64::seed_from_u64(1101);
+        let cases = orientation_cases().into_iter().chain(location_cases());
         for (name, elements, truth, found) in cases {
             let (count, mut squares, mut mean) = (400, 0.0, 0.0);
             for _ in 0..count {

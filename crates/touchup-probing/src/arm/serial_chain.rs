@@ -131,6 +131,34 @@ const CONFIGURATIONS: usize = 32;
 /// Configurations tried to find two links clear of each other.
 const MEETINGS: usize = 256;
 
+/// Refuses a joint without a range, an origin, an axis or a name of its own.
+fn check_joints(joints: &[ChainJoint]) -> Result<(), ChainError> {
+    for (number, joint) in joints.iter().enumerate() {
+        let fault = |what| {
+            Err(ChainError::Joint {
+                name: joint.name.clone(),
+                what,
+            })
+        };
+        if joint
+            .range
+            .is_some_and(|[low, high]| !(low < high && low.is_finite() && high.is_finite()))
+        {
+            return fault("its range has no room: give a lower limit below the upper one");
+        }
+        if !is_finite(&joint.origin) || !joint.axis.iter().all(|part| part.is_finite()) {
+            return fault("its origin or axis is no number");
+        }
+        if joints[..number]
+            .iter()
+            .any(|other| other.name == joint.name)
+        {
+            return fault("another has the same name");
+        }
+    }
+    Ok(())
+}
+
 impl SerialChain {
     /// - `links`: one before the first joint, and one after each.
     /// - `end`: flange in the frame of the last joint.
@@ -138,7 +166,6 @@ impl SerialChain {
     ///
     /// # Errors
     /// [`ChainError`]
-    #[expect(clippy::too_many_lines)]
     pub fn new(
         joints: Vec<ChainJoint>,
         links: Vec<ChainLink>,
@@ -155,29 +182,7 @@ impl SerialChain {
                 links: links.len(),
             });
         }
-        for (number, joint) in joints.iter().enumerate() {
-            let fault = |what| {
-                Err(ChainError::Joint {
-                    name: joint.name.clone(),
-                    what,
-                })
-            };
-            if joint
-                .range
-                .is_some_and(|[low, high]| !(low < high && low.is_finite() && high.is_finite()))
-            {
-                return fault("its range has no room: give a lower limit below the upper one");
-            }
-            if !is_finite(&joint.origin) || !joint.axis.iter().all(|part| part.is_finite()) {
-                return fault("its origin or axis is no number");
-            }
-            if joints[..number]
-                .iter()
-                .any(|other| other.name == joint.name)
-            {
-                return fault("another has the same name");
-            }
-        }
+        check_joints(&joints)?;
         let starts = |number: usize| {
             joints
                 .get(number)

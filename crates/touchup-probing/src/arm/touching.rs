@@ -72,7 +72,6 @@ impl SupervisedArm<'_> {
     ///
     /// # Errors
     /// [`ProbeError`]; a miss is none.
-    #[expect(clippy::too_many_lines)]
     pub fn touch(
         &mut self,
         target: &TouchTarget,
@@ -94,71 +93,8 @@ impl SupervisedArm<'_> {
             target,
             params,
         };
-        let travel = target.search.min(self.limits.search);
-
-        let fast = line.along(params.safe_speed().min(self.limits.speed));
-        let mut contacts = 0;
-        let mut reached = 0.0;
-        let mut searched = |watched: &mut Self, doing, far: f64| {
-            watched.search(doing, fast, far, &mut |state| {
-                reached = line.depth(state);
-                contacts = if line.felt(state) > params.trigger {
-                    contacts + 1
-                } else {
-                    0
-                };
-                contacts >= TRIGGERS
-            })
-        };
         let mut states = Vec::new();
-        let mut outcome = None;
-        // a predicted surface needs no first search, only a measurement from just above it
-        let known = target
-            .expected
-            .map(|expected| (expected.travel, KNOWN * expected.sigma + params.back_off));
-        let mut gone = 0.0;
-        let mut is_contact = false;
-        if let Some((at, room)) = known.filter(|(at, room)| {
-            *room <= MOST_ROOM * params.back_off && room < at && at + room <= travel
-        }) {
-            gone = at - room;
-            is_contact = searched(self, "approaching", gone)?;
-            self.halt("approaching", &mut |_| {})?;
-            if !is_contact {
-                let pressed = self.press(&line, room + at - gone, &mut states)?;
-                gone = self.last.map_or(gone, |state| line.depth(&state)).max(gone);
-                outcome = pressed.then(|| line.outcome_of(&states));
-            }
-        }
-        let outcome = match outcome {
-            Some(outcome) => outcome,
-            None if is_contact || searched(self, "searching", travel - gone)? => {
-                let stopping = "stopping at the surface";
-                let mut forces = Vec::new();
-                self.halt(stopping, &mut |state| forces.push(state.wrench_b.force))?;
-                self.check_sign(stopping, &line, mean(forces.into_iter()))?;
-                let is_free = self.back_off(&line)?;
-                match is_free && self.press(&line, SECOND * params.back_off, &mut states)? {
-                    true => line.outcome_of(&states),
-                    // contact in the first search, but not in the second
-                    false => {
-                        let peak_n = states
-                            .iter()
-                            .map(|state| line.felt(state))
-                            .fold(0.0, f64::max);
-                        TouchOutcome::Unclear(OnsetError::NoContact {
-                            peak_n,
-                            contact_n: params.force,
-                        })
-                    }
-                }
-            }
-            None => {
-                states.clear();
-                self.halt("stopping after a miss", &mut |_| {})?;
-                TouchOutcome::Miss { travel: reached }
-            }
-        };
+        let outcome = self.search_and_measure(&line, &mut states)?;
         // the retraction may begin in contact
         self.leave("retracting", &target.standoff_bt, params.link_speed, params)?;
         let ended = self.last.map_or(begun, |state| state.stamp_ns);
@@ -171,6 +107,71 @@ impl SupervisedArm<'_> {
             peak_force: self.peak_force,
             outcome,
         })
+    }
+
+    /// Finds the surface along the line, and measures it; `states` become the measured curve.
+    fn search_and_measure(
+        &mut self,
+        line: &ApproachLine,
+        states: &mut Vec<ArmState>,
+    ) -> Result<TouchOutcome, ProbeError> {
+        let params = line.params;
+        let travel = line.target.search.min(self.limits.search);
+        let mut search = SurfaceSearch {
+            line,
+            velocity: line.along(params.safe_speed().min(self.limits.speed)),
+            contacts: 0,
+            reached: 0.0,
+        };
+        let mut gone = 0.0;
+        let mut is_contact = false;
+        // a predicted surface needs no first search, only a measurement from just above it
+        if let Some([at, room]) = line.predicted(travel) {
+            gone = at - room;
+            is_contact = search.run(self, "approaching", gone)?;
+            self.halt("approaching", &mut |_| {})?;
+            if !is_contact {
+                let pressed = self.press(line, room + at - gone, states)?;
+                gone = self.last.map_or(gone, |state| line.depth(&state)).max(gone);
+                if pressed {
+                    return Ok(line.outcome_of(states));
+                }
+            }
+        }
+        if is_contact || search.run(self, "searching", travel - gone)? {
+            return self.measure(line, states);
+        }
+        states.clear();
+        self.halt("stopping after a miss", &mut |_| {})?;
+        Ok(TouchOutcome::Miss {
+            travel: search.reached,
+        })
+    }
+
+    /// Stops at the surface, backs off, and measures it.
+    fn measure(
+        &mut self,
+        line: &ApproachLine,
+        states: &mut Vec<ArmState>,
+    ) -> Result<TouchOutcome, ProbeError> {
+        let params = line.params;
+        let stopping = "stopping at the surface";
+        let mut forces = Vec::new();
+        self.halt(stopping, &mut |state| forces.push(state.wrench_b.force))?;
+        self.check_sign(stopping, line, mean(forces.into_iter()))?;
+        let is_free = self.back_off(line)?;
+        if is_free && self.press(line, SECOND * params.back_off, states)? {
+            return Ok(line.outcome_of(states));
+        }
+        // contact in the first search, but not in the second
+        let peak_n = states
+            .iter()
+            .map(|state| line.felt(state))
+            .fold(0.0, f64::max);
+        Ok(TouchOutcome::Unclear(OnsetError::NoContact {
+            peak_n,
+            contact_n: params.force,
+        }))
     }
 
     /// A part pushes: a pull shows the wrong sign of the force.
@@ -275,6 +276,36 @@ impl SupervisedArm<'_> {
     }
 }
 
+/// A search for the surface, fast.
+struct SurfaceSearch<'a> {
+    line: &'a ApproachLine<'a>,
+    velocity: Vector3<f64>,
+    /// consecutive states in contact
+    contacts: u32,
+    /// travel of the ball so far, m
+    reached: f64,
+}
+
+impl SurfaceSearch<'_> {
+    /// Goes on by up to `far`, m; returns whether it met the surface.
+    fn run(
+        &mut self,
+        arm: &mut SupervisedArm,
+        doing: &'static str,
+        far: f64,
+    ) -> Result<bool, ProbeError> {
+        arm.search(doing, self.velocity, far, &mut |state| {
+            self.reached = self.line.depth(state);
+            self.contacts = if self.line.felt(state) > self.line.params.trigger {
+                self.contacts + 1
+            } else {
+                0
+            };
+            self.contacts >= TRIGGERS
+        })
+    }
+}
+
 /// Line of a touch.
 struct ApproachLine<'a> {
     start: Vector3<f64>,
@@ -283,6 +314,17 @@ struct ApproachLine<'a> {
 }
 
 impl ApproachLine<'_> {
+    /// Travel to a surface predicted well enough for a measurement at once, and the room above it,
+    /// m.
+    ///
+    /// - `travel`: length of the search, m.
+    fn predicted(&self, travel: f64) -> Option<[f64; 2]> {
+        let back_off = self.params.back_off;
+        let expected = self.target.expected?;
+        let (at, room) = (expected.travel, KNOWN * expected.sigma + back_off);
+        (room <= MOST_ROOM * back_off && room < at && at + room <= travel).then_some([at, room])
+    }
+
     /// Vector of this length along the line.
     fn along(&self, by: f64) -> Vector3<f64> {
         self.target.direction.into_inner() * by

@@ -1,6 +1,6 @@
 //! Dry run: touches and paths by the current mesh, checked, without motion of the arm.
 
-use nalgebra::{Isometry3, Point3};
+use nalgebra::{Isometry3, Point3, UnitQuaternion};
 
 use super::cell::RobotCell;
 use super::ending::Ending;
@@ -74,7 +74,6 @@ impl RobotCell {
 ///
 /// # Errors
 /// [`ExploreError`] without a pattern for the flag.
-#[expect(clippy::too_many_lines)]
 pub fn plan(
     cell: &RobotCell,
     params: &ProbeParams,
@@ -91,79 +90,106 @@ pub fn plan(
         limits: &params.limits,
         world,
     };
-    let mut at = ToolState::of(cell, &in_free_air);
-    let mut plan = Plan {
-        path: vec![cell.place(&now.pose_bt)],
-        ..Plan::default()
+    let mut dry_run = DryRun {
+        space,
+        rotation,
+        at: ToolState::of(cell, &in_free_air),
+        plan: Plan {
+            path: vec![cell.place(&now.pose_bt)],
+            ..Plan::default()
+        },
     };
-    plan.path
-        .extend(way_out.into_iter().flat_map(WayOut::places));
-    let reach = |allowed: Result<(), LimitError>,
-                 above: &Point3<f64>,
-                 at: &mut ToolState,
-                 plan: &mut Plan| {
-        allowed?;
-        let route = space.route(at, &rotation, above)?;
-        for (place, turned) in route.stops {
-            plan.links.push([at.place, place]);
-            plan.path.push(place);
-            (at.place, at.rotation) = (place, turned);
-        }
-        at.joints = route.joints;
-        Ok::<_, Ending>(())
-    };
+    let on_way_out = way_out.into_iter().flat_map(WayOut::places);
+    dry_run.plan.path.extend(on_way_out);
     while let Some(planned) = explorer.next_touch() {
-        let what = PlannedMotion::Touch(plan.touches.len());
-        plan.touches.push(planned);
-        let allowed = space.may_touch(&rotation, &planned, &at.joints);
-        if let Err(ending) = reach(allowed, &planned.entry, &mut at, &mut plan) {
-            plan.held_back.push(HeldBack {
-                what,
-                why: ending.why(),
-            });
-            explorer.take(&TouchResult::Unclear);
-            continue;
+        explorer.take(&dry_run.touch(&planned, &params.pattern));
+    }
+    dry_run.plan.left_out = explorer.left_out().to_vec();
+    if params.slides {
+        for slide in explorer.slides() {
+            dry_run.slide(slide);
         }
-        let result = contact_on_mesh(&planned, &params.pattern, world);
+    }
+    Ok(dry_run.plan)
+}
+
+/// A dry run so far.
+struct DryRun<'a> {
+    space: ArmFreeSpace<'a>,
+    /// orientation of the tool at the touches
+    rotation: UnitQuaternion<f64>,
+    at: ToolState,
+    plan: Plan,
+}
+
+impl DryRun<'_> {
+    /// Goes through free air to a place above an allowed motion.
+    fn reach(
+        &mut self,
+        allowed: Result<(), LimitError>,
+        above: &Point3<f64>,
+    ) -> Result<(), Ending> {
+        allowed?;
+        let route = self.space.route(&self.at, &self.rotation, above)?;
+        for (place, turned) in route.stops {
+            self.plan.links.push([self.at.place, place]);
+            self.plan.path.push(place);
+            (self.at.place, self.at.rotation) = (place, turned);
+        }
+        self.at.joints = route.joints;
+        Ok(())
+    }
+
+    fn hold_back(&mut self, what: PlannedMotion, ending: &Ending) {
+        let why = ending.why();
+        self.plan.held_back.push(HeldBack { what, why });
+    }
+
+    /// Plans a touch, and returns its result on the mesh.
+    fn touch(&mut self, planned: &TouchPlan, pattern: &PatternParams) -> TouchResult {
+        let what = PlannedMotion::Touch(self.plan.touches.len());
+        self.plan.touches.push(*planned);
+        let allowed = self
+            .space
+            .may_touch(&self.rotation, planned, &self.at.joints);
+        if let Err(ending) = self.reach(allowed, &planned.entry) {
+            self.hold_back(what, &ending);
+            return TouchResult::Unclear;
+        }
+        let result = contact_on_mesh(planned, pattern, self.space.world);
         let end = if let TouchResult::At { centre, .. } = result {
             centre
         } else {
             planned.from
         };
         // in again and out, slowly
-        plan.path
-            .extend([planned.from, end, planned.from, at.place]);
-        explorer.take(&result);
+        self.plan
+            .path
+            .extend([planned.from, end, planned.from, self.at.place]);
+        result
     }
-    plan.left_out = explorer.left_out().to_vec();
-    let slides = if params.slides {
-        explorer.slides()
-    } else {
-        Vec::new()
-    };
-    for slide in slides {
-        let what = PlannedMotion::Slide(plan.slides.len());
-        let allowed = space.may_slide(&rotation, &slide, &at.joints);
-        match reach(allowed, &slide.above(0), &mut at, &mut plan) {
+
+    /// Plans a slide.
+    fn slide(&mut self, slide: Slide) {
+        let what = PlannedMotion::Slide(self.plan.slides.len());
+        let allowed = self
+            .space
+            .may_slide(&self.rotation, &slide, &self.at.joints);
+        match self.reach(allowed, &slide.above(0)) {
             Ok(()) => {
                 let last = slide.stations.len() - 1;
-                plan.path.extend([slide.above(0), slide.lifted(0)]);
-                plan.path
-                    .extend(slide.stations.iter().map(|station| station.centre));
-                plan.path
-                    .extend([slide.lifted(last), slide.above(last), at.place]);
+                let path = &mut self.plan.path;
+                path.extend([slide.above(0), slide.lifted(0)]);
+                path.extend(slide.stations.iter().map(|station| station.centre));
+                path.extend([slide.lifted(last), slide.above(last), self.at.place]);
             }
-            Err(ending) => plan.held_back.push(HeldBack {
-                what,
-                why: ending.why(),
-            }),
+            Err(ending) => self.hold_back(what, &ending),
         }
-        plan.slides.push(slide);
+        self.plan.slides.push(slide);
     }
-    Ok(plan)
 }
 
-/// First contact of a ball with the mesh, by sphere tracing: each step is the remaining distance.
+/// First contact of a ball with the mesh/// First contact of a ball with the mesh, by sphere tracing: each step is the remaining distance.
 fn contact_on_mesh(planned: &TouchPlan, pattern: &PatternParams, world: &dyn World) -> TouchResult {
     let (
         PatternParams {

@@ -52,21 +52,8 @@ pub struct Cost {
     pub replays: Vec<ReplaySpeed>,
 }
 
-/// Measures all costs.
-///
-/// # Errors
-/// [`MeasureError`](crate::error::MeasureError).
-#[expect(clippy::too_many_lines)]
-pub fn cost(effort: Effort, progress: &mut dyn FnMut(&str)) -> MeasureResult<Cost> {
-    let by_edge = recordings::by_edge(effort, progress)?;
-    let by_faces = recordings::by_faces(effort, progress)?;
-    let sizes: &[usize] = effort.choose(
-        &[10_000, 30_000, 100_000],
-        &[
-            10_000, 20_000, 50_000, 100_000, 200_000, 500_000, 1_000_000, 2_000_000, 5_000_000,
-        ],
-    );
-    let timing = effort.choose(
+fn timing_of(effort: Effort) -> Timing {
+    effort.choose(
         Timing {
             warm: 3_000,
             blocks: 15,
@@ -77,7 +64,23 @@ pub fn cost(effort: Effort, progress: &mut dyn FnMut(&str)) -> MeasureResult<Cos
             blocks: 40,
             block: 1_000,
         },
+    )
+}
+
+/// Measures all costs.
+///
+/// # Errors
+/// [`MeasureError`](crate::error::MeasureError).
+pub fn cost(effort: Effort, progress: &mut dyn FnMut(&str)) -> MeasureResult<Cost> {
+    let by_edge = recordings::by_edge(effort, progress)?;
+    let by_faces = recordings::by_faces(effort, progress)?;
+    let sizes: &[usize] = effort.choose(
+        &[10_000, 30_000, 100_000],
+        &[
+            10_000, 20_000, 50_000, 100_000, 200_000, 500_000, 1_000_000, 2_000_000, 5_000_000,
+        ],
     );
+    let timing = timing_of(effort);
     let at_size = |&faces: &usize| {
         progress(&format!("cost: the cheapest push on {faces} faces"));
         pushes::size_cost(faces, timing)

@@ -13,7 +13,7 @@ use crate::{Spread, timed};
 use touchup_features::features::detect;
 use touchup_geometry::mesh::{FaceId, FaceTree, NearbyLeaves, RefitPlan, TriMesh};
 use touchup_io::recording::{RecordingWriter, Topics};
-use touchup_method::haptic::{FaceDynamics, FaceState, RefineError};
+use touchup_method::haptic::{DynamicsParams, FaceDynamics, FaceState, RefineError, RefineParams};
 use touchup_method::reconstruct::Patcher;
 use touchup_method::stylus::{
     BiasTracker, Compensator, ContactEstimator, ContactEstimatorParams, ContactGate, ContactSample,
@@ -62,7 +62,6 @@ fn contacts_of(samples: &[Sample], tip: TipParams) -> MeasureResult<Vec<ContactS
 }
 
 /// Times every stage that is callable by itself, on a scan of edges of 1 mm.
-#[expect(clippy::too_many_lines)]
 pub(super) fn stage_costs(faces: usize, timing: Timing) -> MeasureResult<Vec<StageCost>> {
     let (mesh, samples) = touched_plate(faces, side_of(faces), timing.samples())?;
     let tree = FaceTree::new(&mesh);
@@ -71,75 +70,21 @@ pub(super) fn stage_costs(faces: usize, timing: Timing) -> MeasureResult<Vec<Sta
         .refine_params(WrenchFrame::Sensor)
         .ok_or(MeasureError::NothingMoves)?;
 
-    let plain = Compensator::new(params.compensator)?;
+    let mut stylus = StylusStages::new(&scene, &params)?;
     let tips: Vec<Tip> = samples
         .iter()
-        .map(|sample| plain.compensate(sample))
+        .map(|sample| stylus.plain.compensate(sample))
         .collect();
     let contacts = contacts_of(&samples, params.tip)?;
     let points: Vec<_> = samples.iter().map(touching).collect();
-    let mut sync = Synchroniser::new(scene.sync_params())?;
-    let mut bias = BiasTracker::new(Default::default())?;
-    let mut gate = ContactGate::new(scene.contact.unwrap_or_default())?;
-    let mut motion = TipMotion::new(params.sliding.unwrap_or_default(), params.tip);
-    let dynamics = FaceDynamics::new(params.dynamics).map_err(RefineError::from)?;
+    let mut surface = SurfaceStages::new(&mesh, &tree, params.dynamics)?;
     let writer = RecordingWriter::new(Cursor::new(Vec::new()), &Topics::default());
     let mut writer = writer.map_err(ReplayError::from)?;
     let mut patcher = Patcher::new(scene.patcher_params().ok_or(MeasureError::NothingMoves)?)?;
-    let (mut last, mut nearby) = (None, NearbyLeaves::default());
-    let mut moving = MovingMesh {
-        mesh: mesh.clone(),
-        tree: tree.clone(),
-        plan: RefitPlan::default(),
-        at: None,
-    };
-    let face = FaceState {
-        b: Point3::origin(),
-        n: Vector3::z(),
-    };
 
-    let mut cases = [
-        TimedCase::each("sync", &samples, |sample| {
-            for message in messages(sample) {
-                sync.push(message);
-            }
-            Ok(sync.next_sample())
-        }),
-        TimedCase::each("compensation (nothing to take off)", &samples, |sample| {
-            Ok(plain.compensate(black_box(sample)))
-        }),
-        TimedCase::each("bias tracking", &tips, |tip| {
-            Ok(bias.compensate(tip, |rest| {
-                rest.norm() < scene.contact.unwrap_or_default().free
-            }))
-        }),
-        TimedCase::each("contact gate", &tips, |tip| {
-            Ok(gate.update(tip.stamp_ns, &tip.force_o))
-        }),
-        TimedCase::each("sliding and friction", &tips, |tip| {
-            let ball = motion.update(tip, 1e-3, 0.03);
-            Ok(motion.surface_normal(&ball, 1e-3))
-        }),
-        TimedCase::each("closest face, from the root", &points, |p| {
-            Ok(tree.closest(&mesh, p, RADIUS))
-        }),
-        TimedCase::each("closest face, from the last one", &points, |p| {
-            let hit = match last {
-                Some(hint) => tree.closest_nearby(&mesh, p, hint, RADIUS, &mut nearby),
-                None => tree.closest(&mesh, p, RADIUS),
-            };
-            last = hit.map(|hit| hit.face).or(last);
-            Ok(())
-        }),
-        TimedCase::each("face dynamics", &samples, |sample| {
-            let p = Point3::new(0.0, 0.0, -0.05e-3);
-            Ok(dynamics
-                .step(black_box(&face), &p, &sample.wrench.force, 1e-3)
-                .map_err(RefineError::from)?)
-        }),
-        TimedCase::each("tree update around one face", &points, |p| {
-            Ok(moving.follow(p))
-        }),
+    let mut cases = stylus.cases(&samples, &tips);
+    cases.extend(surface.cases(&samples, &points));
+    cases.extend([
         TimedCase::each("recording (on a thread of its own)", &samples, |sample| {
             let mut written = messages(sample)
                 .into_iter()
@@ -150,7 +95,7 @@ pub(super) fn stage_costs(faces: usize, timing: Timing) -> MeasureResult<Vec<Sta
             patcher.push(contact);
             Ok(())
         }),
-    ];
+    ]);
     let timed = in_turns(&mut cases, timing)?;
     let faces = mesh.face_count();
     cases
@@ -166,7 +111,133 @@ pub(super) fn stage_costs(faces: usize, timing: Timing) -> MeasureResult<Vec<Sta
         .collect()
 }
 
-/// A separate mesh whose boxes follow it.
+/// Stages from messages to a moving ball.
+struct StylusStages {
+    sync: Synchroniser,
+    plain: Compensator,
+    bias: BiasTracker,
+    gate: ContactGate,
+    motion: TipMotion,
+    /// largest force of free air, N
+    free: f64,
+}
+
+impl StylusStages {
+    fn new(scene: &Scene, params: &RefineParams) -> MeasureResult<Self> {
+        let contact = scene.contact.unwrap_or_default();
+        Ok(Self {
+            sync: Synchroniser::new(scene.sync_params())?,
+            plain: Compensator::new(params.compensator)?,
+            bias: BiasTracker::new(Default::default())?,
+            gate: ContactGate::new(contact)?,
+            motion: TipMotion::new(params.sliding.unwrap_or_default(), params.tip),
+            free: contact.free,
+        })
+    }
+
+    fn cases<'a>(&'a mut self, samples: &'a [Sample], tips: &'a [Tip]) -> Vec<TimedCase<'a>> {
+        let Self {
+            sync,
+            plain,
+            bias,
+            gate,
+            motion,
+            free,
+        } = self;
+        vec![
+            TimedCase::each("sync", samples, |sample| {
+                for message in messages(sample) {
+                    sync.push(message);
+                }
+                Ok(sync.next_sample())
+            }),
+            TimedCase::each("compensation (nothing to take off)", samples, |sample| {
+                Ok(plain.compensate(black_box(sample)))
+            }),
+            TimedCase::each("bias tracking", tips, |tip| {
+                Ok(bias.compensate(tip, |rest| rest.norm() < *free))
+            }),
+            TimedCase::each("contact gate", tips, |tip| {
+                Ok(gate.update(tip.stamp_ns, &tip.force_o))
+            }),
+            TimedCase::each("sliding and friction", tips, |tip| {
+                let ball = motion.update(tip, 1e-3, 0.03);
+                Ok(motion.surface_normal(&ball, 1e-3))
+            }),
+        ]
+    }
+}
+
+/// Stages at the surface.
+struct SurfaceStages<'m> {
+    mesh: &'m TriMesh,
+    tree: &'m FaceTree,
+    last: Option<FaceId>,
+    nearby: NearbyLeaves,
+    dynamics: FaceDynamics,
+    moving: MovingMesh,
+}
+
+impl<'m> SurfaceStages<'m> {
+    fn new(mesh: &'m TriMesh, tree: &'m FaceTree, params: DynamicsParams) -> MeasureResult<Self> {
+        Ok(Self {
+            mesh,
+            tree,
+            last: None,
+            nearby: NearbyLeaves::default(),
+            dynamics: FaceDynamics::new(params).map_err(RefineError::from)?,
+            moving: MovingMesh {
+                mesh: mesh.clone(),
+                tree: tree.clone(),
+                plan: RefitPlan::default(),
+                at: None,
+            },
+        })
+    }
+
+    fn cases<'a>(
+        &'a mut self,
+        samples: &'a [Sample],
+        points: &'a [Point3<f64>],
+    ) -> Vec<TimedCase<'a>> {
+        let Self {
+            mesh,
+            tree,
+            last,
+            nearby,
+            dynamics,
+            moving,
+        } = self;
+        let face = FaceState {
+            b: Point3::origin(),
+            n: Vector3::z(),
+        };
+        vec![
+            TimedCase::each("closest face, from the root", points, |p| {
+                Ok(tree.closest(mesh, p, RADIUS))
+            }),
+            TimedCase::each("closest face, from the last one", points, |p| {
+                let hit = match *last {
+                    Some(hint) => tree.closest_nearby(mesh, p, hint, RADIUS, nearby),
+                    None => tree.closest(mesh, p, RADIUS),
+                };
+                *last = hit.map(|hit| hit.face).or(*last);
+                Ok(())
+            }),
+            TimedCase::each("face dynamics", samples, move |sample| {
+                let p = Point3::new(0.0, 0.0, -0.05e-3);
+                Ok(dynamics
+                    .step(black_box(&face), &p, &sample.wrench.force, 1e-3)
+                    .map_err(RefineError::from)?)
+            }),
+            TimedCase::each("tree update around one face", points, |p| {
+                Ok(moving.follow(p))
+            }),
+        ]
+    }
+}
+
+/// A separate mesh whose boxes follow it./// A separate mesh whose boxes follow it.
 struct MovingMesh {
     mesh: TriMesh,
     tree: FaceTree,

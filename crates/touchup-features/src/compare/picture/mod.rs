@@ -70,34 +70,66 @@ const HIGHEST: f64 = 0.62;
 /// Titles of the colour bar.
 const OF_TRUTH: &str = "deviation, mm:  - too little   + too much material";
 const OF_TOUCHES: &str = "touch - scan, mm:  - inside of the scan   + outside";
+
+/// Rows of a picture, pixels.
+struct PictureRows {
+    /// titles of the panels
+    titles: i32,
+    panels: i32,
+    notes: i32,
+    /// meaning of the colours
+    legend: i32,
+    bar: i32,
+    height: i32,
+}
+
+impl PictureRows {
+    fn of(panels: &[PicturePanel<'_>], params: &PictureParams<'_>, panel_height: i32) -> Self {
+        let caption = if params.caption.is_empty() {
+            0
+        } else {
+            NOTE.height() + 8
+        };
+        let titles = MARGIN + TITLE.height() + caption + GAP / 2;
+        let top = titles + TEXT.height() + 8;
+        let notes = top + panel_height + 10;
+        let legend = notes + NOTE.height() + GAP;
+        let of_classes = if has_classes(panels) {
+            NOTE.height() + GAP
+        } else {
+            0
+        };
+        let has_scale = params.legend.is_empty();
+        let histogram = if has_scale && panels.iter().any(|panel| panel.histogram.is_some()) {
+            HISTOGRAM
+        } else {
+            0
+        };
+        let bar = legend + of_classes + NOTE.height() + 8 + histogram;
+        Self {
+            titles,
+            panels: top,
+            notes,
+            legend,
+            bar,
+            height: bar + BAR[1] + 10 + TEXT.height() + MARGIN,
+        }
+    }
+}
+
+fn has_classes(panels: &[PicturePanel<'_>]) -> bool {
+    panels.iter().any(|panel| panel.classes.is_some())
+}
+
 /// Draws the panels side by side, in one scale and one view, with title, colour bar and length.
-#[expect(clippy::too_many_lines)]
 pub fn draw_picture(panels: &[PicturePanel<'_>], params: &PictureParams<'_>) -> Picture {
     let width = params.width.clamp(WIDTHS[0], WIDTHS[1]) as i32;
     let count = panels.len().max(1) as i32;
     let panel_width = (width - 2 * MARGIN - (count - 1) * GAP) / count;
     let camera = camera_for(panels, params);
     let frame = frame_for(panels, &camera, panel_width);
-    let panel_height = frame.size[1] as i32;
-
-    let caption = if params.caption.is_empty() {
-        0
-    } else {
-        NOTE.height() + 8
-    };
-    let above = MARGIN + TITLE.height() + caption + GAP / 2;
-    let foot = above + TEXT.height() + 8 + panel_height + 10 + NOTE.height() + GAP;
-    let has_classes = panels.iter().any(|panel| panel.classes.is_some());
-    let legend = if has_classes { NOTE.height() + GAP } else { 0 };
-    let has_scale = params.legend.is_empty();
-    let histogram = if has_scale && panels.iter().any(|panel| panel.histogram.is_some()) {
-        HISTOGRAM
-    } else {
-        0
-    };
-    let bar = foot + legend + NOTE.height() + 8 + histogram;
-    let height = bar + BAR[1] + 10 + TEXT.height() + MARGIN;
-    let mut picture = Picture::blank([width, height].map(|side| side as u32), PAPER);
+    let rows = PictureRows::of(panels, params, frame.size[1] as i32);
+    let mut picture = Picture::blank([width, rows.height].map(|side| side as u32), PAPER);
     picture.write(
         [MARGIN, MARGIN],
         TITLE,
@@ -119,44 +151,41 @@ pub fn draw_picture(panels: &[PicturePanel<'_>], params: &PictureParams<'_>) -> 
         .iter()
         .zip((0..).map(|i| MARGIN + i * (panel_width + GAP)))
     {
-        let top = above + TEXT.height() + 8;
-        picture.write(
-            [left, above],
-            TEXT,
-            INK,
-            &fitted(panel.title, TEXT, panel_width),
-        );
+        let title = fitted(panel.title, TEXT, panel_width);
+        picture.write([left, rows.titles], TEXT, INK, &title);
         let mut drawing = draw(panel, &camera, &frame, &colours);
         draw_labels(&mut drawing, params.labels, &camera, &frame);
-        picture.paste([left, top], &drawing);
-        picture.write(
-            [left, top + panel_height + 10],
-            NOTE,
-            SOFT_INK,
-            &fitted(panel.note, NOTE, panel_width),
-        );
+        picture.paste([left, rows.panels], &drawing);
+        let note = fitted(panel.note, NOTE, panel_width);
+        picture.write([left, rows.notes], NOTE, SOFT_INK, &note);
     }
-    if has_classes {
-        draw_legend(
-            &mut picture,
-            foot,
-            &Class::ALL.map(|class| (colour_of_class(class), class.name())),
-        );
-    }
-    let foot = foot + legend;
-    if has_scale {
-        draw_scale(
-            &mut picture,
-            [foot, bar],
-            &colours,
-            if has_classes { OF_TOUCHES } else { OF_TRUTH },
-        );
-        draw_histograms(&mut picture, bar, panels, &colours);
-    } else {
-        draw_legend(&mut picture, foot, params.legend);
-    }
-    draw_length(&mut picture, bar, &frame);
+    draw_meaning(&mut picture, &rows, panels, params, &colours);
+    draw_length(&mut picture, rows.bar, &frame);
     picture
+}
+
+/// Draws the meaning of the colours: classes, and colour bar or the given legend.
+fn draw_meaning(
+    picture: &mut Picture,
+    rows: &PictureRows,
+    panels: &[PicturePanel<'_>],
+    params: &PictureParams<'_>,
+    colours: &ColourScale,
+) {
+    let mut foot = rows.legend;
+    let mut scale = OF_TRUTH;
+    if has_classes(panels) {
+        let classes = Class::ALL.map(|class| (colour_of_class(class), class.name()));
+        draw_legend(picture, foot, &classes);
+        foot += NOTE.height() + GAP;
+        scale = OF_TOUCHES;
+    }
+    if params.legend.is_empty() {
+        draw_scale(picture, [foot, rows.bar], colours, scale);
+        draw_histograms(picture, rows.bar, panels, colours);
+    } else {
+        draw_legend(picture, foot, params.legend);
+    }
 }
 
 /// A bare picture of a mesh, with the pixels of some places.

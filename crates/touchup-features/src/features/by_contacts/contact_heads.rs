@@ -142,32 +142,13 @@ fn turn_of<'a>(of: impl Iterator<Item = &'a BoreContact>) -> f64 {
     parts.iter().filter(|part| **part).count() as f64 / PARTS as f64
 }
 
-/// The head under a land.
+/// A contact of a wall: radius of the wall, distance of the ball's centre from it, m, and itself.
+type WallContact<'a> = (f64, f64, &'a BoreContact);
+
+/// Radius of the wall with contacts over most of a turn, m.
 ///
-/// - `narrow`, `level`, `land`: radius of the bore, m; distance of the land along `out`, m; its
-///   number
-#[expect(clippy::too_many_lines)]
-fn head_under(
-    observed: &SegmentTouches,
-    seen: &[BoreContact],
-    on_axis: &Point3<f64>,
-    out: &Vector3<f64>,
-    (narrow, level, land): (f64, f64, usize),
-) -> Option<Counterbore> {
-    let radius = observed.reach();
-    // distance of the ball's centre from the wall or its edge
-    let away = |one: &BoreContact| {
-        let above = (one.z - level).max(0.0);
-        (above < radius).then(|| (radius * radius - above * above).sqrt())
-    };
-    let is_beside = |one: &&BoreContact| one.inward > LEAN && one.z > level - DEPTHS.end * radius;
-    let walls: Vec<(f64, f64, &BoreContact)> = seen
-        .iter()
-        .filter(is_beside)
-        .filter_map(|one| Some((one.rho + away(one)?, away(one)?, one)))
-        .filter(|(wide, ..)| HEADS.contains(&(wide / narrow)))
-        .collect();
-    let near = SEARCHED * radius;
+/// - `near`: tolerance of one circle, m.
+fn most_felt_width(walls: &[WallContact], near: f64) -> Option<f64> {
     let on = |wide: f64| {
         walls
             .iter()
@@ -190,6 +171,81 @@ fn head_under(
             .partial_cmp(&(b.0, b.1))
             .unwrap_or(std::cmp::Ordering::Equal)
     })?;
+    Some(wide)
+}
+
+/// The wall of a head by its contacts.
+fn head_wall(
+    observed: &SegmentTouches,
+    of_wall: &[&WallContact],
+    guess: &Cylinder,
+) -> Option<FittedSurface<Cylinder>> {
+    let numbers: Vec<u32> = of_wall.iter().map(|(.., one)| one.touch).collect();
+    let observations: Vec<Observation> = observed
+        .of_touches(&numbers)
+        .into_iter()
+        .zip(of_wall)
+        .map(|(observation, (_, away, _))| Observation {
+            offset: *away,
+            ..observation
+        })
+        .collect();
+    let [common_sigma, shift_sigma] = observed.systematic(&numbers);
+    let params = FitParams {
+        common_sigma,
+        shift_sigma,
+        axis_sigma: Some(1e-3),
+        ..FitParams::default()
+    };
+    let found = fit(guess, &observations, &params).ok()?;
+    let touches = numbers
+        .into_iter()
+        .zip(&found.used)
+        .filter(|&(_, used)| *used)
+        .map(|(touch, _)| touch)
+        .collect();
+    let surface = found.surface;
+    Some(FittedSurface {
+        surface,
+        fit: Some(found),
+        touches,
+        to: FittedTo::Touches,
+        uneven: 0.0,
+        is_confirmed: true,
+    })
+}
+
+/// The head under a land.
+///
+/// - `narrow`, `level`, `land`: radius of the bore, m; distance of the land along `out`, m; its
+///   number
+fn head_under(
+    observed: &SegmentTouches,
+    seen: &[BoreContact],
+    on_axis: &Point3<f64>,
+    out: &Vector3<f64>,
+    (narrow, level, land): (f64, f64, usize),
+) -> Option<Counterbore> {
+    let radius = observed.reach();
+    // distance of the ball's centre from the wall or its edge
+    let away = |one: &BoreContact| {
+        let above = (one.z - level).max(0.0);
+        (above < radius).then(|| (radius * radius - above * above).sqrt())
+    };
+    let is_beside = |one: &&BoreContact| one.inward > LEAN && one.z > level - DEPTHS.end * radius;
+    let walls: Vec<WallContact> = seen
+        .iter()
+        .filter(is_beside)
+        .filter_map(|one| Some((one.rho + away(one)?, away(one)?, one)))
+        .filter(|(wide, ..)| HEADS.contains(&(wide / narrow)))
+        .collect();
+    let near = SEARCHED * radius;
+    let on = |wide: f64| {
+        walls
+            .iter()
+            .filter(move |(other, ..)| (other - wide).abs() < near)
+    };
+    let wide = most_felt_width(&walls, near)?;
     let wide = median(&mut on(wide).map(|(other, ..)| *other).collect::<Vec<_>>())?;
     // the floor between both
     let is_floor = |one: &&BoreContact| {
@@ -212,42 +268,10 @@ fn head_under(
     {
         return None;
     }
-    let of_wall: Vec<&(f64, f64, &BoreContact)> =
-        on(wide).filter(|(.., one)| one.z > height - near).collect();
-    let numbers: Vec<u32> = of_wall.iter().map(|(.., one)| one.touch).collect();
-    let observations: Vec<Observation> = observed
-        .of_touches(&numbers)
-        .into_iter()
-        .zip(&of_wall)
-        .map(|(observation, (_, away, _))| Observation {
-            offset: *away,
-            ..observation
-        })
-        .collect();
-    let [common_sigma, shift_sigma] = observed.systematic(&numbers);
-    let params = FitParams {
-        common_sigma,
-        shift_sigma,
-        axis_sigma: Some(1e-3),
-        ..FitParams::default()
-    };
-    let guess = Cylinder::new(on_axis + out * (level - depth / 2.0), out, wide, true);
-    let found = fit(&guess, &observations, &params).ok()?;
-    let touches = numbers
-        .into_iter()
-        .zip(&found.used)
-        .filter(|&(_, used)| *used)
-        .map(|(touch, _)| touch)
-        .collect();
-    let surface = found.surface;
-    let wall = FittedSurface {
-        surface,
-        fit: Some(found),
-        touches,
-        to: FittedTo::Touches,
-        uneven: 0.0,
-        is_confirmed: true,
-    };
+    let of_wall: Vec<&WallContact> = on(wide).filter(|(.., one)| one.z > height - near).collect();
+    let axis_point = on_axis + out * (level - depth / 2.0);
+    let guess = Cylinder::new(axis_point, out, wide, true);
+    let wall = head_wall(observed, &of_wall, &guess)?;
     Some(Counterbore {
         wall,
         floor: floor.into_iter().map(|one| one.touch).collect(),

@@ -62,7 +62,6 @@ pub(super) struct Sizes {
 /// [`DynamicsError::Stiff`] if [`MOST_STEPS`] do not suffice, [`DynamicsError::NotFinite`] if the
 /// solution is not, [`DynamicsError::Undetermined`] if roundings grow beyond `relative` of the
 /// travel.
-#[expect(clippy::too_many_lines)]
 pub(super) fn integrate(
     end: f64,
     sizes: Sizes,
@@ -72,13 +71,7 @@ pub(super) fn integrate(
     let (mut y, mut time, mut farthest) = (CoupledState::zeros(), 0.0, 0.0_f64);
     // accumulated roundings of this step and the steps before
     let mut noise = CoupledState::zeros();
-    // the first step changes little, and the next ones grow from there
-    let Slope { rate, jacobian } = slope(&y);
-    let fastest = jacobian
-        .amax()
-        .max(rate.y.abs() / sizes.turning)
-        .max(rate.amax() / sizes.contact);
-    let mut step = end.min(FIRST / fastest.max(f64::MIN_POSITIVE));
+    let mut step = end.min(first_step(&slope(&y), sizes));
     for _ in 0..MOST_STEPS {
         if time >= end {
             let allowed = CoupledState::new(
@@ -103,13 +96,7 @@ pub(super) fn integrate(
                     .max(sizes.rounding / AGREEMENT),
             )
         };
-        let halves = radau(&y, dt, size, &slope).and_then(|whole| {
-            let middle = radau(&y, 0.5 * dt, size, &slope)?;
-            let halves = radau(&middle, 0.5 * dt, size, &slope)?;
-            let error = (whole - halves).component_div(&size(&halves)).amax() / AGREEMENT;
-            Some((halves, error))
-        });
-        let change = match halves {
+        let change = match two_halves(&y, dt, size, &slope) {
             Some((next, error)) if error <= 1.0 => {
                 let grown = [&y, &next].map(|y| propagator(&slope(y).jacobian, dt).abs() * noise);
                 noise = grown[0].sup(&grown[1])
@@ -139,6 +126,30 @@ pub(super) fn integrate(
         reached_s: time,
         dt_s: end,
     })
+}
+
+/// Length of the first step, s: it changes little, and the next ones grow from there.
+fn first_step(Slope { rate, jacobian }: &Slope, sizes: Sizes) -> f64 {
+    let fastest = jacobian
+        .amax()
+        .max(rate.y.abs() / sizes.turning)
+        .max(rate.amax() / sizes.contact);
+    FIRST / fastest.max(f64::MIN_POSITIVE)
+}
+
+/// The state after both halves of a step, and its difference from the whole step, in units of the
+/// required agreement.
+fn two_halves(
+    y: &CoupledState,
+    dt: f64,
+    size: impl Fn(&CoupledState) -> CoupledState,
+    slope: &impl Fn(&CoupledState) -> Slope,
+) -> Option<(CoupledState, f64)> {
+    let whole = radau(y, dt, &size, slope)?;
+    let middle = radau(y, 0.5 * dt, &size, slope)?;
+    let halves = radau(&middle, 0.5 * dt, &size, slope)?;
+    let error = (whole - halves).component_div(&size(&halves)).amax() / AGREEMENT;
+    Some((halves, error))
 }
 
 /// Half of the trace, and the squared half distance of both eigenvalues, negative for complex ones.

@@ -13,7 +13,7 @@
 use nalgebra::Vector3;
 
 use crate::reconstruct::evidence::agreement::{Agreement, LARGEST_MISMATCH, RESTS};
-use crate::reconstruct::evidence::contact_map::MeanContact;
+use crate::reconstruct::evidence::contact_map::{ContactMap, MeanContact};
 use crate::reconstruct::evidence::point_evidence::Evidence;
 use crate::reconstruct::lattice::VertexKey;
 use crate::reconstruct::support::Support;
@@ -139,7 +139,6 @@ impl KeptDetail {
 /// gₖ = wₖ exp(−|pₖ − pⱼ|² / b²); then over the contacts within a radius
 ///
 /// Σ wⱼ ρ̄ⱼ² ≤ Σ wⱼ (l² σ̄ⱼ² + ε²).
-#[expect(clippy::too_many_lines)]
 fn agreement_of(evidence: &Evidence<'_>) -> Agreement {
     let (contacts, radius) = (evidence.contacts, evidence.params.radius);
     let mut fineness = Fineness::new(evidence);
@@ -170,26 +169,11 @@ fn agreement_of(evidence: &Evidence<'_>) -> Agreement {
         .zip(&agreement.mismatch)
         .map(rest)
         .collect();
-    // squared averaged residual, and its limit, m²
-    let averaged = |contact: &MeanContact| {
-        let (mut sum, mut variance, mut weights) = (0.0, 0.0, 0.0);
-        contacts.near(
-            &contact.point,
-            AVERAGED_WITHIN * radius,
-            |distance_squared, index| {
-                if let Some(rest) = rest[index as usize] {
-                    let weight = contacts.means()[index as usize].weight
-                        * (-distance_squared / (AVERAGED * radius).powi(2)).exp();
-                    sum += weight * rest;
-                    variance += weight * weight * contacts.noise_variance(index);
-                    weights += weight;
-                }
-            },
-        );
-        let noise = LIMIT * LIMIT * variance / (weights * weights) + (SLACK * radius).powi(2);
-        [(sum / weights).powi(2), noise]
-    };
-    let averaged: Vec<[f64; 2]> = contacts.means().iter().map(averaged).collect();
+    let averaged: Vec<[f64; 2]> = contacts
+        .means()
+        .iter()
+        .map(|contact| averaged_residual(contacts, &rest, radius, contact))
+        .collect();
     let agrees = |(index, mismatch): (u32, &Option<f64>)| {
         let (mismatch, own) = ((*mismatch)?, rest[index as usize]?);
         let (mut left, mut noise) = (0.0, 0.0);
@@ -209,6 +193,33 @@ fn agreement_of(evidence: &Evidence<'_>) -> Agreement {
     };
     agreement.mismatch = (0..).zip(&agreement.mismatch).map(agrees).collect();
     agreement
+}
+
+/// Squared averaged residual ρ̄² at a contact, and its limit, m².
+///
+/// - `rest`: residual of each contact, m.
+fn averaged_residual(
+    contacts: &ContactMap,
+    rest: &[Option<f64>],
+    radius: f64,
+    contact: &MeanContact,
+) -> [f64; 2] {
+    let (mut sum, mut variance, mut weights) = (0.0, 0.0, 0.0);
+    contacts.near(
+        &contact.point,
+        AVERAGED_WITHIN * radius,
+        |distance_squared, index| {
+            if let Some(rest) = rest[index as usize] {
+                let weight = contacts.means()[index as usize].weight
+                    * (-distance_squared / (AVERAGED * radius).powi(2)).exp();
+                sum += weight * rest;
+                variance += weight * weight * contacts.noise_variance(index);
+                weights += weight;
+            }
+        },
+    );
+    let noise = LIMIT * LIMIT * variance / (weights * weights) + (SLACK * radius).powi(2);
+    [(sum / weights).powi(2), noise]
 }
 
 /// Height of a contact's ball above the scan, m; negative: in it.

@@ -511,22 +511,20 @@ mod tests {
     use crate::reconstruct::{ContactSigma, SurfaceContact};
     use crate::stylus::{TipBody, TipPlace, TipShape};
 
-    /// The face z = 0 has contacts up to the edge y = 0, and the ball rolls around it by 60°: 0.5 r
-    /// beyond, the face is 0.26 r deep in it.
-    #[test]
-    #[expect(clippy::too_many_lines)]
-    fn a_face_ends_where_the_ball_rolled_around_its_edge() {
-        let radius = 1.5e-3;
-        let free_space = || {
-            FreeSpace::new(
-                TipBody::new(TipShape::Ball, radius).unwrap(),
-                0.05 * radius,
-                2.0 * radius,
-            )
-        };
+    fn free_space(radius: f64) -> FreeSpace {
+        FreeSpace::new(
+            TipBody::new(TipShape::Ball, radius).unwrap(),
+            0.05 * radius,
+            2.0 * radius,
+        )
+    }
+
+    /// Contacts on the face z = 0 up to the edge y = 0, and the places of a ball that rolls around
+    /// it by 60°.
+    fn face_with_a_rolled_edge(radius: f64) -> (ContactMap, FreeSpace) {
         let (mut contacts, mut rolled) = (
             ContactMap::new(radius / 3.0, 2.0 * radius, None),
-            free_space(),
+            free_space(radius),
         );
         let along = || (-12..=12).map(|i| f64::from(i) * 0.25e-3);
         for (x, j) in along().flat_map(|x| (0..=16).map(move |j| (x, f64::from(j)))) {
@@ -552,6 +550,15 @@ mod tests {
                 axis: Vector3::z(),
             });
         }
+        (contacts, rolled)
+    }
+
+    /// The face z = 0 has contacts up to the edge y = 0, and the ball rolls around it by 60°: 0.5 r
+    /// beyond, the face is 0.26 r deep in it.
+    #[test]
+    fn a_face_ends_where_the_ball_rolled_around_its_edge() {
+        let radius = 1.5e-3;
+        let (contacts, rolled) = face_with_a_rolled_edge(radius);
         let corners = vec![
             Point3::origin(),
             Point3::new(1.0, 0.0, 0.0),
@@ -559,7 +566,7 @@ mod tests {
         ];
         let scan = TriMesh::new(corners, vec![[0, 1, 2]]).unwrap();
         let (tree, params) = (FaceTree::new(&scan), EvidenceParams::new(radius, 0.3e-3));
-        let nowhere = free_space();
+        let nowhere = free_space(radius);
         let value = |free_space: &FreeSpace, y: f64| {
             let (contacts, scan, tree, params) = (&contacts, &scan, &tree, &params);
             let evidence = Evidence {

@@ -87,7 +87,6 @@ impl FieldParams {
     /// Uncertainty of the value last found at `x` with the same scratch.
     ///
     /// - `window_ns`: passes within this time share their noise, the nearer the more.
-    #[expect(clippy::too_many_lines)]
     pub(crate) fn sigma_of(
         &self,
         found: &FieldValue,
@@ -97,43 +96,10 @@ impl FieldParams {
         scratch: &mut FieldScratch,
     ) -> FitSigma {
         let nearest_other = scratch.nearest_other(found.value);
-        let FieldScratch {
-            near,
-            pieces,
-            shares,
-            decides,
-            ..
-        } = scratch;
-        let Some(piece) = pieces.get(*decides as usize) else {
+        let Some([calibration, scatter]) = contact_errors(store, x, scratch) else {
             return FitSigma::default();
         };
-        let (mut calibration, mut scatter) = (0.0, 0.0);
-        shares.clear();
-        for member in near.iter().filter(|member| member.piece == *decides) {
-            let mean = &store.means()[member.index as usize];
-            let weight = member.distance_squared / piece.fit_weight;
-            let arm = x - mean.point;
-            let off = 0.5 * (mean.normal + piece.facing).dot(&arm);
-            let lateral = (arm.norm_squared() - off * off).max(0.0).sqrt();
-            let sums = store.sums(member.index);
-            let sigma = sums.sigma();
-            calibration += weight * sigma.systematic();
-            scatter += weight * (off - piece.value()).powi(2);
-            shares.extend(sums.passes.iter().map(|pass| {
-                let share = weight * pass.weight / mean.weight / f64::from(pass.count).sqrt();
-                let tilt = share * 0.5 * lateral * sigma.normal;
-                PassShare {
-                    began_ns: pass.began_ns,
-                    noise: share * sigma.noise.hypot(sigma.reach),
-                    tilt,
-                }
-            }));
-        }
-        shares.sort_unstable_by(|a, b| {
-            a.began_ns
-                .cmp(&b.began_ns)
-                .then(a.noise.total_cmp(&b.noise))
-        });
+        let FieldScratch { near, shares, .. } = scratch;
         let [noise, tilt] = variances(shares, (window_ns as f64 / WINDOW_TO_CORRELATION) as i64);
         let nearness = |reach: f64| (1.0 - nearest_other / (reach * self.sigma)).max(0.0);
         let gap = found.lateral() / (DOUBLING_GAP * self.sigma);
@@ -219,6 +185,51 @@ fn variances(shares: &[PassShare], correlation_ns: i64) -> [f64; 2] {
         }
     }
     sums
+}
+
+/// Calibration error, m, and scatter, m², of the contacts of the last deciding piece at `x`; the
+/// shares of their passes come in order of time. `None` without a piece.
+fn contact_errors(
+    store: &ContactMap,
+    x: &Point3<f64>,
+    scratch: &mut FieldScratch,
+) -> Option<[f64; 2]> {
+    let FieldScratch {
+        near,
+        pieces,
+        shares,
+        decides,
+        ..
+    } = scratch;
+    let piece = pieces.get(*decides as usize)?;
+    let (mut calibration, mut scatter) = (0.0, 0.0);
+    shares.clear();
+    for member in near.iter().filter(|member| member.piece == *decides) {
+        let mean = &store.means()[member.index as usize];
+        let weight = member.distance_squared / piece.fit_weight;
+        let arm = x - mean.point;
+        let off = 0.5 * (mean.normal + piece.facing).dot(&arm);
+        let lateral = (arm.norm_squared() - off * off).max(0.0).sqrt();
+        let sums = store.sums(member.index);
+        let sigma = sums.sigma();
+        calibration += weight * sigma.systematic();
+        scatter += weight * (off - piece.value()).powi(2);
+        shares.extend(sums.passes.iter().map(|pass| {
+            let share = weight * pass.weight / mean.weight / f64::from(pass.count).sqrt();
+            let tilt = share * 0.5 * lateral * sigma.normal;
+            PassShare {
+                began_ns: pass.began_ns,
+                noise: share * sigma.noise.hypot(sigma.reach),
+                tilt,
+            }
+        }));
+    }
+    shares.sort_unstable_by(|a, b| {
+        a.began_ns
+            .cmp(&b.began_ns)
+            .then(a.noise.total_cmp(&b.noise))
+    });
+    Some([calibration, scatter])
 }
 
 /// Error of a vertex as a multiple of its distance from the fit: edges and corners combine several

@@ -412,6 +412,29 @@ impl SlotPattern {
         }
     }
 
+    /// The next place on the part around a slot: beside both walls, towards both ends.
+    fn place_around(&self, context: &mut SearchContext, walls: &Stadium) -> Point3<f64> {
+        let ball = context.params.ball_radius;
+        let in_f = |v: Vector3<f64>| {
+            context
+                .pose_of
+                .inverse_transform_vector(&(walls.pose_of.rotation * v))
+        };
+        let centre = context.in_f(&walls.center());
+        let away = walls.width / 2.0 + BESIDE * ball;
+        let beside =
+            |x: f64, y: f64| centre + in_f(Vector3::new(x * walls.length / 3.0, y * away, 0.0));
+        let wanted =
+            [[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]].map(|[x, y]| beside(x, y));
+        // elsewhere beside it, and beyond its ends
+        let beyond = [-1.0, 1.0]
+            .map(|x| centre + in_f(Vector3::x() * x * (walls.length / 2.0 + BESIDE * ball)));
+        let others =
+            (0..ALONG).flat_map(|at| [-1.0, 1.0].map(|y| beside(1.5 * spread(at, ALONG), y)));
+        let others: Vec<_> = others.chain(beyond).collect();
+        context.over_part(self.tried, &wanted, &others)
+    }
+
     fn take_around(&mut self, context: &mut SearchContext, touch: &PatternStep) {
         self.opening.top.extend(touch.observation);
         self.tried += 1;
@@ -468,7 +491,6 @@ pub(in crate::plan) fn around_stadium(half: f64, count: usize) -> impl Iterator<
 }
 
 impl TouchPattern for SlotPattern {
-    #[expect(clippy::too_many_lines)]
     fn next(&mut self, context: &mut SearchContext) -> Result<Option<TouchPlan>, ExploreError> {
         let ball = context.params.ball_radius;
         let shallow = SHALLOW * ball;
@@ -502,24 +524,7 @@ impl TouchPattern for SlotPattern {
         let centre = context.in_f(&walls.center());
         Ok(Some(match self.phase {
             SlotPhase::Around => {
-                // beside both walls, towards both ends
-                let away = walls.width / 2.0 + BESIDE * ball;
-                let beside = |x: f64, y: f64| {
-                    centre + in_f(Vector3::new(x * walls.length / 3.0, y * away, 0.0))
-                };
-                let wanted =
-                    [[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]].map(|[x, y]| beside(x, y));
-                // elsewhere beside it, and beyond its ends
-                let beyond = [-1.0, 1.0].map(|x| {
-                    centre + in_f(Vector3::x() * x * (walls.length / 2.0 + BESIDE * ball))
-                });
-                let others = (0..ALONG)
-                    .flat_map(|at| [-1.0, 1.0].map(|y| beside(1.5 * spread(at, ALONG), y)));
-                let place = context.over_part(
-                    self.tried,
-                    &wanted,
-                    &others.chain(beyond).collect::<Vec<_>>(),
-                );
+                let place = self.place_around(context, &walls);
                 context.down(&place, context.params.clearance + 2.0 * ball + ROUGH)
             }
             SlotPhase::End(..) if self.tried >= SEARCHES => {
