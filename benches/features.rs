@@ -73,7 +73,7 @@ fn touched_plate() -> (TriMesh, Vec<ProbedPoint>) {
 #[divan::bench(sample_count = 200)]
 fn followed(bencher: Bencher) {
     let (mesh, touches) = touched_plate();
-    let mut known = Tracker::new();
+    let mut known = Tracker::default();
     known.renew(&mesh, &touches[..touches.len() - 2000]);
     // the first news that change a feature
     let is_news = |count: &usize| !known.clone().update(&touches[..*count]).is_empty();

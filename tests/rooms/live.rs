@@ -303,7 +303,7 @@ fn one_after_the_other(stream: &PlateStream, pace: Pace) -> ([TriMesh; 2], Vec<U
             ));
             patcher.renew_far(&stream.scan, &tree);
         }
-        patcher.push(refiner.contact().unwrap());
+        patcher.push(refiner.contacts().latest().unwrap());
         if at_hand.is_none()
             && due
                 .front()
@@ -336,7 +336,7 @@ fn one_after_the_other(stream: &PlateStream, pace: Pace) -> ([TriMesh; 2], Vec<U
     for _ in 0..2 {
         follow(&patcher.renewed(&stream.scan, &tree));
     }
-    ([touching, refiner.into_mesh()], answers)
+    ([touching, refiner.mesh().clone()], answers)
 }
 
 fn assert_same(a: &TriMesh, b: &TriMesh) {
@@ -760,7 +760,7 @@ fn evidence_made_again_without_a_stroke_is_that_of_an_engine_that_never_took_it(
             engine.take_probed().unwrap().apply_to(&mut probed);
             (
                 triangles(engine.refiner().mesh()),
-                *engine.refiner().contact().unwrap(),
+                *engine.refiner().contacts().latest().unwrap(),
                 probed,
             )
         });

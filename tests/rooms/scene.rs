@@ -4,15 +4,16 @@ mod parameters;
 
 use std::collections::BTreeSet;
 
-use nalgebra::vector;
+use nalgebra::{Point3, vector};
 use proptest::prelude::*;
 use touchup::haptic::{
-    ContactModel, DynamicsParams, MotionDirection, RefineParams, RoiSize, SigmoidParams, StepRule,
-    TipParams,
+    ContactModel, DynamicsParams, MotionDirection, RefineParams, Refiner, RoiSize, SigmoidParams,
+    StepRule, TipParams,
 };
 use touchup::io::mesh_file::MeshUnit;
 use touchup::io::recording::TableColumns;
-use touchup::reconstruct::PatcherParams;
+use touchup::mesh::TriMesh;
+use touchup::reconstruct::{Patcher, PatcherParams};
 use touchup::scene::{
     CompensationSection, GravityAxes, LeftOut, MarkersSection, Mode, PayloadSection, RobotSection,
     ScanToSpaceSection, Scene, SceneError, Setting,
@@ -606,7 +607,9 @@ fn the_shape_of_the_tip_reaches_refiner_and_patcher() {
             (refiner.shape, refiner.tip.radius),
             (patcher.touches.shape, patcher.touches.radius)
         );
-        assert!(refiner.check().is_ok() && touchup::reconstruct::Patcher::new(patcher).is_ok());
+        let corners = [[0.0, 0.0], [0.01, 0.0], [0.0, 0.01]].map(|[x, y]| Point3::new(x, y, 0.0));
+        let mesh = TriMesh::new(corners.to_vec(), vec![[0, 1, 2]]).unwrap();
+        assert!(Refiner::new(mesh, refiner).is_ok() && Patcher::new(patcher).is_ok());
         (refiner.shape, patcher.evidence.radius)
     };
     assert_eq!(shapes("radius_mm: 1.5"), (TipShape::Ball, 1.5e-3));

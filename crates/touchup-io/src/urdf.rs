@@ -331,7 +331,7 @@ fn body(link: Node<'_, '_>) -> Option<Capsule> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use touchup_probing::arm::UrGeometry;
+    use touchup_probing::arm::{ArmGeometry, UrGeometry};
 
     /// A UR5e as its driver describes it, in ROS's frames: joints about z, each at the end of the
     /// one before.
@@ -372,13 +372,17 @@ mod tests {
         assert_eq!(names, ["pan", "lift", "elbow", "w1", "w2", "w3"]);
         assert_eq!(chain.joints()[2].range, Some([-3.1, 3.1]));
         assert_eq!(chain.joints()[5].range, None);
+        let (arm, ur) = (
+            ArmGeometry::from(chain),
+            ArmGeometry::from(UrGeometry::UR5E),
+        );
         for joints in [
             [0.0; 6],
             [0.3, -1.2, 1.4, -0.9, 1.1, 0.4],
             [-2.0, 0.4, -1.1, 2.2, -0.7, 3.0],
         ] {
-            let difference = chain.flange(&joints.into()).to_homogeneous()
-                - UrGeometry::UR5E.flange(&joints).to_homogeneous();
+            let difference = arm.flange(&joints.into()).to_homogeneous()
+                - ur.flange(&joints.into()).to_homogeneous();
             assert!(difference.norm() < 1e-12, "{joints:?}: {difference}");
         }
     }

@@ -56,15 +56,15 @@ impl ProbingRun {
         arm: &mut dyn Arm,
         world: &mut dyn World,
     ) -> FlagResult {
-        let mut prober = Prober::new(arm, &self.cell, params, world)
-            .leaving_by(self.way_out.take())
-            .beside(std::mem::take(&mut self.references));
+        let mut prober = Prober::new(arm, &self.cell, params, world);
+        prober.way_out = self.way_out.take();
+        prober.references = std::mem::take(&mut self.references);
         let probed = prober.probe(flag);
         // a contact that moved the part invalidates earlier touches
         if !probed.ending.is_displaced() {
-            self.references = prober.take_references();
+            self.references = std::mem::take(&mut prober.references);
         }
-        self.way_out = prober.into_way_out();
+        self.way_out = prober.way_out;
         probed
     }
 }

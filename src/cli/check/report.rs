@@ -154,24 +154,24 @@ reported! {
     struct CheckedSpot, fn of(found: &Repeatability) {
         spot_mm: [f64; 3] = (found.place * 1e3).coords.into(),
         normal: [f64; 3] = found.normal.into_inner().into(),
-        touches: Vec<CheckedTouch> = found.touches.iter().zip(found.deviations()).map(CheckedTouch::of).collect(),
-        range_um: f64 = found.range() * 1e6,
-        std_um: f64 = found.deviation() * 1e6,
+        touches: Vec<CheckedTouch> = found.touches.iter().map(|touch| CheckedTouch::of(touch, found.mean_height)).collect(),
+        range_um: f64 = found.range * 1e6,
+        std_um: f64 = found.deviation * 1e6,
         /// First side minus the other.
-        reversal_um: f64 = found.reversal() * 1e6,
-        stiffness_n_per_mm: f64 = found.stiffness()[0] / 1e3,
-        stiffness_std_n_per_mm: f64 = found.stiffness()[1] / 1e3,
+        reversal_um: f64 = found.reversal * 1e6,
+        stiffness_n_per_mm: f64 = found.stiffness[0] / 1e3,
+        stiffness_std_n_per_mm: f64 = found.stiffness[1] / 1e3,
     }
 }
 
 reported! {
-    struct CheckedTouch, fn of(found: (&SpotTouch, f64)) {
-        side: i8 = found.0.side,
+    struct CheckedTouch, fn of(touch: &SpotTouch, mean_height: f64) {
+        side: i8 = touch.side,
         /// Outward from the mean of all.
-        deviation_um: f64 = found.1 * 1e6,
-        std_um: f64 = found.0.sigma * 1e6,
-        stiffness_n_per_mm: f64 = found.0.stiffness[0] / 1e3,
-        verdict: &'static str = found.0.verdict.name(),
+        deviation_um: f64 = (touch.height - mean_height) * 1e6,
+        std_um: f64 = touch.sigma * 1e6,
+        stiffness_n_per_mm: f64 = touch.stiffness[0] / 1e3,
+        verdict: &'static str = touch.verdict.name(),
     }
 }
 

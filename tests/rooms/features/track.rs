@@ -38,7 +38,7 @@ fn new_touches_are_in_the_numbers_at_once() {
     let (mesh, touches) = touched_plate(3);
     // runs along the walls come at the end of the demo: leave most of them out at first
     let early = &touches[..touches.len() * 3 / 4];
-    let mut tracker = Tracker::new();
+    let mut tracker = Tracker::default();
     let before = sizes(tracker.renew(&mesh, early));
     let known: Vec<Feature> = tracker.features().to_vec();
     let changed = tracker.update(&touches);
@@ -98,7 +98,7 @@ fn new_touches_are_in_the_numbers_at_once() {
 #[test]
 fn nothing_new_changes_nothing() {
     let (mesh, touches) = touched_plate(5);
-    let mut tracker = Tracker::new();
+    let mut tracker = Tracker::default();
     let first = tracker.renew(&mesh, &touches).to_vec();
     assert!(tracker.update(&touches).is_empty());
     assert_eq!(tracker.features(), first);

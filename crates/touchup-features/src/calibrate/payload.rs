@@ -8,7 +8,7 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use super::StaticPose;
 use super::fit::{CalibrationFit, Equation, UndeterminedDirection, fit, least_determined};
-use touchup_method::stylus::{Payload, Wrench, WrenchFrame};
+use touchup_method::stylus::{Payload, WrenchFrame};
 
 /// Settings of [`fit_payload`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -89,14 +89,6 @@ impl PayloadFit {
             mass: self.weight[0] / self.gravity,
             p_sc: self.p_sc.value,
             gravity_o: gravity_w,
-        }
-    }
-
-    /// Bias for the compensator.
-    pub fn bias_s(&self) -> Wrench {
-        Wrench {
-            force: self.bias_force.value,
-            torque: self.bias_torque.value,
         }
     }
 }

@@ -115,11 +115,6 @@ impl InspectedQuantity {
         )
     }
 
-    /// Whether the value depends on the nominal place of the feature.
-    pub fn needs_place(self) -> bool {
-        self == Self::Position
-    }
-
     /// Whether features of this kind have the quantity.
     pub fn is_of(self, kind: FeatureKind) -> bool {
         let is_round = matches!(

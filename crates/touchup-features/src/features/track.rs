@@ -42,11 +42,6 @@ const MOST_FITTED: usize = 240;
 const RADIUS: f64 = 1e-3;
 
 impl Tracker {
-    /// A tracker without features.
-    pub fn new() -> Self {
-        Self::default()
-    }
-
     /// Known features, in order of id.
     pub fn features(&self) -> &[Feature] {
         &self.features

@@ -161,11 +161,6 @@ fn rim_of(part: &TriMesh, faces: &[[u32; 3]], ids: &[u32]) -> (Vec<RimVertex>, V
 }
 
 impl MeshRemainder {
-    /// Number of faces.
-    pub fn face_count(&self) -> usize {
-        self.faces.len()
-    }
-
     /// Memory, bytes.
     pub fn bytes(&self) -> usize {
         self.positions.capacity() * size_of::<Point3<f64>>()

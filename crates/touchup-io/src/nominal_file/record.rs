@@ -165,7 +165,7 @@ impl NominalRecord {
         }
         self.check_units(quantity)?;
         self.check_limits(quantity)?;
-        if quantity.needs_place() && self.center_mm.is_none() {
+        if quantity == InspectedQuantity::Position && self.center_mm.is_none() {
             return Err(format!(
                 "{name}: {quantity} needs the nominal centre: fill in center_x_mm, center_y_mm and center_z_mm"
             ));

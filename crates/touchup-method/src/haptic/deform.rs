@@ -84,7 +84,11 @@ pub(super) struct HandleRegion {
 }
 
 impl DeformableMesh {
-    pub fn new(mesh: TriMesh, guard: Option<GuardParams>, touched: Option<&ScanRegion>) -> Self {
+    pub(crate) fn new(
+        mesh: TriMesh,
+        guard: Option<GuardParams>,
+        touched: Option<&ScanRegion>,
+    ) -> Self {
         let tree = FaceTree::new(&mesh);
         let mut evidence = vec![[0.0; 3]; mesh.face_slots()];
         for (face, _) in mesh.faces() {

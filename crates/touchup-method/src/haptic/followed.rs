@@ -26,7 +26,7 @@ pub(super) struct FollowedPatch {
 
 impl FollowedPatch {
     /// For a scan without a patch, with room for `vertices` new vertices.
-    pub fn new(scan: &TriMesh, vertices: usize) -> Self {
+    pub(crate) fn new(scan: &TriMesh, vertices: usize) -> Self {
         let slots = scan.vertex_slots();
         let (mut support, mut moved_ns) = (
             Vec::with_capacity(slots + vertices),

@@ -36,8 +36,8 @@ pub use crate::stylus::{SlidingParams, TipParams};
 
 use crate::reconstruct::{PatchDelta, Support};
 use crate::stylus::{
-    Ball, ContactEstimator, ContactSample, FrictionCoefficient, LONGEST_HOLD, NormalEstimate,
-    Sample, SampleError, SettingError, TipBody, TipPlace, TouchState,
+    Ball, ContactEstimator, ContactSample, LONGEST_HOLD, NormalEstimate, Sample, SampleError,
+    SettingError, TipBody, TipPlace, TouchState,
 };
 use deform::{DeformableMesh, HandleRegion};
 use dynamics::turn;
@@ -689,11 +689,6 @@ impl Refiner {
             .map(|patch| patch.support(vertex))
     }
 
-    /// Returns the mesh.
-    pub fn into_mesh(self) -> TriMesh {
-        self.deformable.mesh
-    }
-
     /// Current memory of mesh and tree.
     pub fn footprint(&self) -> Footprint {
         self.deformable.footprint()
@@ -709,12 +704,6 @@ impl Refiner {
     /// Samples by outcome.
     pub fn counts(&self) -> &RefineCounts {
         &self.counts
-    }
-
-    /// Measured kinetic friction; `None` until the ball has slid far enough, or without a friction
-    /// estimate.
-    pub fn friction(&self) -> Option<FrictionCoefficient> {
-        self.contacts.friction()
     }
 
     /// A new contact estimator with the settings of this refiner.
@@ -736,11 +725,6 @@ impl Refiner {
         self.counts.contacts = contacts.contacts();
         self.contacts = contacts;
         (self.begun, self.track) = (None, None);
-    }
-
-    /// Contact decision on the last sample; `None` before the first.
-    pub fn contact(&self) -> Option<&ContactSample> {
-        self.contacts.latest()
     }
 
     /// Vertices moved by the last contact.

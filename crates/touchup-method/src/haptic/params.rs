@@ -245,7 +245,7 @@ impl RefineParams {
 
     /// # Errors
     /// [`SettingError`] naming the first setting outside its range.
-    pub fn check(&self) -> Result<(), SettingError> {
+    pub(crate) fn check(&self) -> Result<(), SettingError> {
         TipBody::new(self.shape, self.tip.radius)?;
         self.tip.check()?;
         ScanParams {

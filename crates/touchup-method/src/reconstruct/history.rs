@@ -32,7 +32,7 @@ pub(crate) struct History<K, V> {
 
 impl<K: Key, V> History<K, V> {
     /// Keeps at most `room` values; the oldest strokes go first.
-    pub fn new(room: usize) -> Self {
+    pub(crate) fn new(room: usize) -> Self {
         Self {
             done: VecDeque::new(),
             undone: Vec::new(),

@@ -303,7 +303,7 @@ impl Numbers {
     const NONE: u32 = u32::MAX;
 
     /// Looks up the keys in `cells`.
-    pub fn new<V>(table: &CellTable<LatticeNode, V>, cells: &CellBox) -> Self {
+    pub(crate) fn new<V>(table: &CellTable<LatticeNode, V>, cells: &CellBox) -> Self {
         let cells = if cells.volume() < table.len() as f64 {
             *cells
         } else {

@@ -34,7 +34,7 @@ pub use contour::crossing::Crossing;
 pub use contour::dual_contouring::contour;
 pub use contour::patched::{OpenSquare, Patch, PatchedMesh};
 pub use contour::scan_clipping::Cut;
-pub use evidence::contact_map::{ContactMap, GateParams, MeanContact};
+pub use evidence::contact_map::{ContactMap, MeanContact};
 pub use evidence::contact_uncertainty::{CalibrationParams, ContactSigma, UncertaintyParams};
 pub use evidence::outliers::{Outlier, Outliers};
 pub use evidence::piecewise::FieldParams;

@@ -21,7 +21,7 @@ pub(crate) struct ForceNoise {
 
 impl ForceNoise {
     /// Noise of a usual sensor.
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self {
             step: RunningMedian {
                 length: USUAL_STEP,

@@ -8,7 +8,7 @@ use nalgebra::{Matrix3, Point3, Vector3};
 /// Sums over a window about an instant, sufficient for the parabola. A longer window extends a
 /// shorter one.
 #[derive(Clone, Debug)]
-pub struct LocalMotion {
+pub(crate) struct LocalMotion {
     /// unit of time of the sums, s
     scale: f64,
     middle: Point3<f64>,
@@ -22,7 +22,7 @@ pub struct LocalMotion {
 
 /// Position and velocity of the ball at the instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SmoothedMotion {
+pub(crate) struct SmoothedMotion {
     /// m, in O
     pub centre: Point3<f64>,
     /// m/s, in O
@@ -40,7 +40,7 @@ impl LocalMotion {
     ///
     /// - `middle`: the position at the instant, m, in O.
     /// - `scale`: a time about as long as half the longest window, s; more than 0.
-    pub fn new(middle: Point3<f64>, scale: f64) -> Self {
+    pub(crate) fn new(middle: Point3<f64>, scale: f64) -> Self {
         Self {
             scale,
             middle,
@@ -52,7 +52,7 @@ impl LocalMotion {
 
     /// Adds the position `after` (s) the instant.
     #[inline]
-    pub fn add(&mut self, after: f64, position: &Point3<f64>) {
+    pub(crate) fn add(&mut self, after: f64, position: &Point3<f64>) {
         let u = after / self.scale;
         let arm = position - self.middle;
         let mut power = 1.0;
@@ -68,7 +68,7 @@ impl LocalMotion {
 
     /// Parabola at the instant; for too few positions their mean, at rest and with no bound on its
     /// error.
-    pub fn motion(&self) -> SmoothedMotion {
+    pub(crate) fn motion(&self) -> SmoothedMotion {
         let [n, u, u2, u3, u4] = self.powers;
         let parabola = (n > 3.0)
             .then(|| Matrix3::new(n, u, u2, u, u2, u3, u2, u3, u4).try_inverse())
@@ -96,5 +96,33 @@ impl LocalMotion {
             velocity_gain: inverse[(1, 1)].max(0.0).sqrt() / self.scale,
             residual: ((self.squares - explained).max(0.0) / (3.0 * (n - 3.0))).sqrt(),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_parabola_is_found_exactly_and_its_errors_are_those_of_least_squares() {
+        let at = |t: f64| Point3::new(0.02 * t, 0.5 * t * t, 1e-3 + 0.01 * t - 0.3 * t * t);
+        let mut sums = LocalMotion::new(at(0.1), 0.016);
+        (-16..=16).for_each(|i| sums.add(f64::from(i) * 1e-3, &at(0.1 + f64::from(i) * 1e-3)));
+        let motion = sums.motion();
+        assert!((motion.centre - at(0.1)).norm() < 1e-15);
+        assert!((motion.velocity - Vector3::new(0.02, 0.1, 0.01 - 0.06)).norm() < 1e-12);
+        assert!(motion.residual < 1e-10);
+        // in a window as long before as after, the slope varies by σ / √Σ t²
+        let squares: f64 = (-16..=16).map(|i| (f64::from(i) * 1e-3).powi(2)).sum();
+        assert!((motion.velocity_gain * squares.sqrt() - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn three_positions_give_no_velocity() {
+        let mut sums = LocalMotion::new(Point3::origin(), 0.016);
+        (0..3).for_each(|i| sums.add(f64::from(i) * 1e-3, &Point3::new(f64::from(i), 0.0, 0.0)));
+        let motion = sums.motion();
+        assert_eq!((motion.velocity, motion.centre.x), (Vector3::zeros(), 1.0));
+        assert!(motion.velocity_gain.is_infinite() && motion.residual.is_infinite());
     }
 }

@@ -5,8 +5,7 @@
 //! [`ContactEstimator`] turns each sample into one [`ContactSample`] for all users: [`Compensator`]
 //! subtracts weight and bias and rotates the force into the object frame, [`BiasTracker`] follows
 //! the sensor drift, [`ContactGate`] detects contact, [`TipMotion`] and [`Friction`] estimate
-//! sliding and surface normal. [`TipBody`] finds the touching point of the tip, [`LocalMotion`] the
-//! motion around one instant. Without a pose topic, [`MovingFrame`] derives the pose from the
+//! sliding and surface normal. [`TipBody`] finds the touching point of the tip. Without a pose topic, [`MovingFrame`] derives the pose from the
 //! transforms of a [`FrameBuffer`].
 
 mod bias;
@@ -42,10 +41,10 @@ pub(crate) use force_noise::ForceNoise;
 pub use frame_buffer::{FrameBuffer, FrameError, FrameTransform, plain_name};
 pub(crate) use friction::WIDEST_CONE_COSINE;
 pub use friction::{Friction, FrictionCoefficient, NormalEstimate, Sliding};
-pub use local_motion::{LocalMotion, SmoothedMotion};
+pub(crate) use local_motion::{LocalMotion, SmoothedMotion};
 pub use markers::{
     MarkerBody, MarkerCounts, MarkerFilter, MarkerFrame, MarkerObservation, MarkerParams,
-    SpringParams, Tracking,
+    SpringParams,
 };
 pub use moving_frame::MovingFrame;
 pub use placement::Placement;

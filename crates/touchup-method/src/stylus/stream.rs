@@ -29,7 +29,7 @@ pub(super) struct Stream<T> {
 }
 
 impl<T: StampedMessage + Copy> Stream<T> {
-    pub fn new(capacity: usize, wait_ns: i64) -> Self {
+    pub(crate) fn new(capacity: usize, wait_ns: i64) -> Self {
         Self {
             held: VecDeque::with_capacity(capacity),
             newest: None,

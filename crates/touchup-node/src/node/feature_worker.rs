@@ -75,7 +75,7 @@ impl FeatureWorker {
             port,
             shared,
             session,
-            tracker: Tracker::new(),
+            tracker: Tracker::default(),
             touches: Vec::new(),
             flags: BTreeMap::new(),
             radii: BTreeMap::new(),

@@ -43,7 +43,8 @@ impl RefinementWorker {
             .session
             .engine
             .refiner()
-            .contact()
+            .contacts()
+            .latest()
             .map(|contact| contact.tip)
         else {
             return;

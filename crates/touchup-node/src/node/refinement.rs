@@ -381,7 +381,7 @@ impl RefinementWorker {
                 self.session.counters.accepted += 1;
                 self.session.last_ns = Some(sample.stamp_ns);
                 self.session.input.sample(sample);
-                if let Some(contact) = self.session.engine.refiner().contact() {
+                if let Some(contact) = self.session.engine.refiner().contacts().latest() {
                     self.session.input.contact(contact);
                 }
                 self.publish_mismatch(&update);

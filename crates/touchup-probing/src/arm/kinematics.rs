@@ -100,7 +100,7 @@ impl UrGeometry {
     }
 
     /// Pose of the flange in the base B.
-    pub fn flange(&self, joints: &[f64; 6]) -> Isometry3<f64> {
+    pub(crate) fn flange(&self, joints: &[f64; 6]) -> Isometry3<f64> {
         self.link_poses(joints)[5]
     }
 
@@ -114,7 +114,7 @@ impl UrGeometry {
     }
 
     /// Velocity of the flange by the joint velocities: three rows of m/s, three of rad/s, in B.
-    pub fn jacobian(&self, joints: &[f64; 6]) -> Matrix6<f64> {
+    pub(crate) fn jacobian(&self, joints: &[f64; 6]) -> Matrix6<f64> {
         let end = self.flange(joints).translation.vector;
         let (mut jacobian, mut pose) = (Matrix6::zeros(), Isometry3::identity());
         for (column, (link, angle)) in self.links().iter().zip(joints).enumerate() {
@@ -132,7 +132,7 @@ impl UrGeometry {
     /// Distance from a singularity: the smallest singular value of the Jacobian, lengths in units
     /// of upper arm plus forearm. Zero for a stretched arm, for the wrist above the shoulder, and
     /// for parallel axes 4 and 6.
-    pub fn dexterity(&self, joints: &[f64; 6]) -> f64 {
+    pub(crate) fn dexterity(&self, joints: &[f64; 6]) -> f64 {
         let mut jacobian = self.jacobian(joints);
         jacobian
             .rows_mut(0, 3)

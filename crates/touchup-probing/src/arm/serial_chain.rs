@@ -301,7 +301,7 @@ impl SerialChain {
     }
 
     /// Pose of the flange in the base B.
-    pub fn flange(&self, joints: &Joints) -> Isometry3<f64> {
+    pub(crate) fn flange(&self, joints: &Joints) -> Isometry3<f64> {
         self.frames(joints).flange
     }
 

@@ -76,7 +76,7 @@ const LEAST_TURN: f64 = 1e-3;
 
 /// A tool near a mesh.
 #[derive(Clone, Copy)]
-pub struct Clearance<'a> {
+pub(crate) struct Clearance<'a> {
     /// tool that must keep clear
     pub tool: &'a Tool,
     /// Direction from the ball to the handle: up.
@@ -90,7 +90,7 @@ impl Clearance<'_> {
     /// the margin, at an unknown depth.
     ///
     /// - `reach`: maximum room that matters, m.
-    pub fn room(&self, centre: &Point3<f64>, reach: f64) -> f64 {
+    pub(crate) fn room(&self, centre: &Point3<f64>, reach: f64) -> f64 {
         let Tool {
             ball_radius,
             shaft_radius,
@@ -158,7 +158,7 @@ impl Clearance<'_> {
     ///
     /// # Errors
     /// [`LinkError::NoTurn`].
-    pub fn turning_place(
+    pub(crate) fn turning_place(
         &self,
         from: &Point3<f64>,
         angle: f64,
@@ -258,6 +258,8 @@ fn is_clear_along(end: f64, room: impl Fn(f64) -> f64, step: impl Fn(f64) -> f64
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
 
     /// The part is below z = 0.
@@ -300,5 +302,81 @@ mod tests {
                 margin_mm: 0.5
             })
         );
+    }
+
+    /// Beside a wall on the side it turns to, a tool turns only above it.
+    #[test]
+    fn a_turn_that_would_meet_a_wall_is_made_above_it() {
+        // the half space x > 10 mm below z = 50 mm
+        let wall = |p: &Point3<f64>, reach: f64| {
+            let (x, z) = (10e-3 - p.x, p.z - 50e-3);
+            let far = if x > 0.0 && z > 0.0 {
+                x.hypot(z)
+            } else {
+                x.max(z)
+            };
+            far.min(reach)
+        };
+        let tool = Tool::default();
+        let shaft = |share: f64| {
+            // upright first, towards the wall by 60° in the end
+            let angle = share * std::f64::consts::FRAC_PI_3;
+            Unit::new_normalize(Vector3::new(angle.sin(), 0.0, angle.cos()))
+        };
+        let upright = Clearance {
+            tool: &tool,
+            shaft: Vector3::z_axis(),
+            distance: &wall,
+        };
+        let place = upright
+            .turning_place(&Point3::origin(), std::f64::consts::FRAC_PI_3, &shaft)
+            .unwrap();
+        for step in 0..=100 {
+            let direction = shaft(f64::from(step) / 100.0);
+            for mm in 0..=600 {
+                let p = place + direction.into_inner() * (f64::from(mm) * 1e-4);
+                assert!(
+                    wall(&p, 1.0) >= tool.shaft_radius + tool.margin - 1e-9,
+                    "{p} at {step} %"
+                );
+            }
+        }
+        // away from the wall it turns where it is
+        let away = |share: f64| Unit::new_normalize(Vector3::new(-share, 0.0, 1.0));
+        let place = upright
+            .turning_place(&Point3::origin(), std::f64::consts::FRAC_PI_4, &away)
+            .unwrap();
+        assert_eq!(place, Point3::origin());
+    }
+
+    proptest! {
+        /// The room of a ball and a shaft among places of a mesh in closed form: the distance of a
+        /// place from a segment.
+        #[test]
+        fn room_is_never_more_than_there_is(
+            places in prop::collection::vec([-30e-3..30e-3f64, -30e-3..30e-3f64, -10e-3..80e-3f64], 1..6),
+            lean in [-1.0..1.0f64, -1.0..1.0f64],
+            reach in 0.0..50e-3f64,
+        ) {
+            let tool = Tool::default();
+            let shaft = Unit::new_normalize(Vector3::new(lean[0], lean[1], 1.0));
+            let distance = |p: &Point3<f64>, reach: f64| {
+                places.iter().map(|place| (p - Point3::from(*place)).norm()).fold(reach, f64::min)
+            };
+            let room = Clearance { tool: &tool, shaft, distance: &distance }.room(&Point3::origin(), reach);
+            let from_shaft = |place: &[f64; 3]| {
+                let p = Vector3::from(*place);
+                (p - shaft.into_inner() * p.dot(&shaft).clamp(0.0, tool.shaft_length)).norm()
+            };
+            let shaft_room = places.iter().map(from_shaft).fold(f64::INFINITY, f64::min) - tool.shaft_radius - tool.margin;
+            let ball_room = distance(&Point3::origin(), 1.0) - tool.ball_radius - tool.margin;
+            let least = shaft_room.min(ball_room);
+            // only that part of the mesh is reported
+            prop_assert!(room <= least + 1e-12 || (room < 0.0 && least < 0.0), "{room} of {shaft_room} {ball_room}");
+            // and not less than half of what there is beyond the balls that model the shaft
+            let spare = tool.shaft_radius * (1.25f64.sqrt() - 1.0);
+            let there = (shaft_room - spare).min(ball_room);
+            prop_assert!(room >= (there / 2.0).min(there).min(reach / 2.0) - 1e-12, "{room} of {there}");
+        }
     }
 }

@@ -28,7 +28,7 @@ pub use cell::RobotCell;
 pub use cone::{NotReached, ShaftOrientation};
 pub use dry_run::{HeldBack, Plan, PlannedMotion, plan};
 pub use ending::{Ending, FlagResult, ProbedSlide, ProbedTouch, ReferenceTouch};
-pub use links::{Clearance, LinkError, Tool};
+pub use links::{LinkError, Tool};
 pub use payload::{PayloadProbeError, PayloadReadings};
 pub use prober::{Flag, ProbeParams, Prober};
 pub use reference::References;

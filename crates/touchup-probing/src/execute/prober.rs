@@ -124,12 +124,15 @@ pub struct Prober<'a> {
     pub(super) cell: &'a RobotCell,
     pub(super) params: &'a ProbeParams,
     pub(super) world: &'a mut dyn World,
-    pub(super) way_out: Option<WayOut>,
-    pub(super) references: References,
+    /// path out of the feature in which the last probing stopped, with which the next one begins if
+    /// the arm still stands there; `None`: the arm is in free air, or its place is unknown
+    pub way_out: Option<WayOut>,
+    /// contacts of earlier features that the arm touches again after the next one
+    pub references: References,
 }
 
 impl<'a> Prober<'a> {
-    /// - `arm`: at rest in free air, or at the beginning of [`Self::leaving_by`].
+    /// - `arm`: at rest in free air, or at the beginning of [`Self::way_out`].
     pub fn new(
         arm: &'a mut dyn Arm,
         cell: &'a RobotCell,
@@ -144,30 +147,6 @@ impl<'a> Prober<'a> {
             way_out: None,
             references: References::default(),
         }
-    }
-
-    /// Lets the next probing begin with the path out of the feature in which another one stopped,
-    /// if the arm still stands there.
-    #[must_use]
-    pub fn leaving_by(self, way_out: Option<WayOut>) -> Self {
-        Self { way_out, ..self }
-    }
-
-    /// Path out of the feature in which the last probing stopped; `None`: the arm is in free air,
-    /// or its place is unknown.
-    pub fn into_way_out(self) -> Option<WayOut> {
-        self.way_out
-    }
-
-    /// Adds contacts of earlier features that the arm touches again after the next one.
-    #[must_use]
-    pub fn beside(self, references: References) -> Self {
-        Self { references, ..self }
-    }
-
-    /// Contacts that the arm touches again, for the next feature.
-    pub fn take_references(&mut self) -> References {
-        std::mem::take(&mut self.references)
     }
 
     /// The arm under all supervision.

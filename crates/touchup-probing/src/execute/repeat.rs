@@ -35,6 +35,17 @@ pub struct Repeatability {
     pub place: Point3<f64>,
     /// Normal out of the part, in O.
     pub normal: Unit<Vector3<f64>>,
+    /// Mean height of the touches, m.
+    pub mean_height: f64,
+    /// Range of the heights, m.
+    pub range: f64,
+    /// Standard deviation of one touch, m.
+    pub deviation: f64,
+    /// Mean height from the first side above that from the other, m.
+    pub reversal: f64,
+    /// Stiffness of arm, probe and part together, and its standard uncertainty, N/m: mean and
+    /// scatter of the curves.
+    pub stiffness: [f64; 2],
 }
 
 /// Why the spot gives no result.
@@ -93,11 +104,7 @@ impl Prober<'_> {
                     verdict: onset.verdict,
                 });
             }
-            Ok(Repeatability {
-                touches,
-                place,
-                normal,
-            })
+            Ok(Repeatability::of(touches, place, normal))
         })
     }
 
@@ -166,57 +173,41 @@ impl FeatureProbing<'_, '_> {
 }
 
 impl Repeatability {
-    /// Range of the heights, m.
-    pub fn range(&self) -> f64 {
-        let heights = self.touches.iter().map(|touch| touch.height);
-        let [low, high] = heights.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], h| {
+    /// - `touches`: from both sides.
+    fn of(touches: Vec<SpotTouch>, place: Point3<f64>, normal: Unit<Vector3<f64>>) -> Self {
+        let heights = || touches.iter().map(|touch| touch.height);
+        let [low, high] = heights().fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], h| {
             [a.min(h), b.max(h)]
         });
-        high - low
-    }
-
-    /// Mean height of the touches from one side, or from both, m.
-    fn mean(&self, side: Option<i8>) -> f64 {
-        let heights = self
-            .touches
-            .iter()
-            .filter(|touch| side.is_none_or(|side| touch.side == side));
-        let [sum, count] = heights.fold([0.0, 0.0], |[sum, count], touch| {
-            [sum + touch.height, count + 1.0]
+        let mean_height = mean(&touches, None);
+        let squares: f64 = heights().map(|height| (height - mean_height).powi(2)).sum();
+        let (count, all) = (touches.len() as f64, || {
+            touches.iter().map(|touch| touch.stiffness[0])
         });
-        sum / count
+        let stiffness = all().sum::<f64>() / count;
+        let scatter = (all().map(|k| (k - stiffness).powi(2)).sum::<f64>() / (count - 1.0)).sqrt();
+        Self {
+            mean_height,
+            range: high - low,
+            deviation: (squares / (count - 1.0)).sqrt(),
+            reversal: mean(&touches, Some(1)) - mean(&touches, Some(-1)),
+            stiffness: [stiffness, scatter / count.sqrt()],
+            touches,
+            place,
+            normal,
+        }
     }
+}
 
-    /// Standard deviation of one touch, m.
-    pub fn deviation(&self) -> f64 {
-        let squares: f64 = self.deviations().iter().map(|off| off.powi(2)).sum();
-        (squares / (self.touches.len() as f64 - 1.0)).sqrt()
-    }
-
-    /// Deviation of each touch from their mean, m.
-    pub fn deviations(&self) -> Vec<f64> {
-        let mean = self.mean(None);
-        self.touches
-            .iter()
-            .map(|touch| touch.height - mean)
-            .collect()
-    }
-
-    /// Mean height from the first side above that from the other, m.
-    pub fn reversal(&self) -> f64 {
-        self.mean(Some(1)) - self.mean(Some(-1))
-    }
-
-    /// Stiffness of arm, probe and part together, and its standard uncertainty, N/m: mean and
-    /// scatter of the curves.
-    pub fn stiffness(&self) -> [f64; 2] {
-        let (count, all) = (self.touches.len() as f64, || {
-            self.touches.iter().map(|touch| touch.stiffness[0])
-        });
-        let mean = all().sum::<f64>() / count;
-        let scatter = (all().map(|k| (k - mean).powi(2)).sum::<f64>() / (count - 1.0)).sqrt();
-        [mean, scatter / count.sqrt()]
-    }
+/// Mean height of the touches from one side, or from both, m.
+fn mean(touches: &[SpotTouch], side: Option<i8>) -> f64 {
+    let heights = touches
+        .iter()
+        .filter(|touch| side.is_none_or(|side| touch.side == side));
+    let [sum, count] = heights.fold([0.0, 0.0], |[sum, count], touch| {
+        [sum + touch.height, count + 1.0]
+    });
+    sum / count
 }
 
 #[cfg(test)]
@@ -241,22 +232,18 @@ mod tests {
         ]
         .map(touch)
         .to_vec();
-        let spot = Repeatability {
-            touches,
-            place: Point3::origin(),
-            normal: Vector3::z_axis(),
-        };
+        let spot = Repeatability::of(touches, Point3::origin(), Vector3::z_axis());
         let near =
             |value: f64, expected: f64| (value - expected).abs() < 1e-12 + 1e-9 * expected.abs();
-        assert!(near(spot.range(), 8e-6), "{}", spot.range());
-        assert!(near(spot.reversal(), 6e-6), "{}", spot.reversal());
+        assert!(near(spot.range, 8e-6), "{}", spot.range);
+        assert!(near(spot.reversal, 6e-6), "{}", spot.reversal);
         // mean 0, squares 1 + 9 + 25 + 9 over 3
         assert!(
-            near(spot.deviation(), (44.0f64 / 3.0).sqrt() * 1e-6),
+            near(spot.deviation, (44.0f64 / 3.0).sqrt() * 1e-6),
             "{}",
-            spot.deviation()
+            spot.deviation
         );
-        let [k, u] = spot.stiffness();
+        let [k, u] = spot.stiffness;
         // mean 15, squares 4 over 3, over 4 touches
         assert!(
             near(k, 15e3) && near(u, (4.0f64 / 3.0).sqrt() / 2.0 * 1e3),

@@ -13,7 +13,7 @@ type InformationMatrix = SMatrix<f64, FREEDOMS, FREEDOMS>;
 
 /// A possible touch.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Candidate {
+pub(crate) struct Candidate {
     /// Place of the touch on the surface, m in O.
     pub point: Point3<f64>,
     /// Standard deviation along the normal, m.
@@ -22,7 +22,7 @@ pub struct Candidate {
 
 /// Requested standard deviations of the numbers of a surface.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct TargetUncertainties {
+pub(crate) struct TargetUncertainties {
     /// Derivatives of each number by the freedoms, over its requested deviation.
     by: Vec<Steps>,
     /// the same for other numbers, which must not stay undetermined
@@ -34,7 +34,7 @@ const REST: f64 = 8.0;
 
 impl TargetUncertainties {
     /// Adds a number with a requested standard deviation of `sigma` (m or rad).
-    pub fn and(mut self, by: &[(Freedom, f64)], sigma: f64) -> Self {
+    pub(crate) fn and(mut self, by: &[(Freedom, f64)], sigma: f64) -> Self {
         let mut steps = Steps::zeros();
         by.iter()
             .for_each(|(freedom, x)| steps[*freedom as usize] += x / sigma);
@@ -58,7 +58,7 @@ impl TargetUncertainties {
     /// with another number open goes astray by its curvature.
     ///
     /// - `sigma`: requested of the numbers, m; `size`: of the surface, m, as the lever of a lean.
-    pub fn and_the_rest<M: SurfaceModel>(mut self, sigma: f64, size: f64) -> Self {
+    pub(crate) fn and_the_rest<M: SurfaceModel>(mut self, sigma: f64, size: f64) -> Self {
         for freedom in Freedom::ALL
             .into_iter()
             .filter(|freedom| M::FREE[*freedom as usize])
@@ -74,14 +74,14 @@ impl TargetUncertainties {
 
 /// Covariance of a surface's freedoms.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Knowledge {
+pub(crate) struct Knowledge {
     covariance: InformationMatrix,
 }
 
 impl Knowledge {
     /// Before any touch: standard deviations of `length` (m) or `angle` (rad) for each freedom of
     /// the surface.
-    pub fn before<M: SurfaceModel>(length: f64, angle: f64) -> Self {
+    pub(crate) fn before<M: SurfaceModel>(length: f64, angle: f64) -> Self {
         let sigma = Freedom::ALL.map(|freedom| match freedom {
             _ if !M::FREE[freedom as usize] => 0.0,
             Freedom::TiltX | Freedom::TiltY | Freedom::Turn => angle,
@@ -96,7 +96,7 @@ impl Knowledge {
     }
 
     /// After one more touch of the surface.
-    pub fn with<M: SurfaceModel>(&self, surface: &M, touch: &Candidate) -> Self {
+    pub(crate) fn with<M: SurfaceModel>(&self, surface: &M, touch: &Candidate) -> Self {
         let (_, g) = surface.derivatives(&touch.point);
         let cg = self.covariance * g;
         let covariance = self.covariance - cg * cg.transpose() / (touch.sigma.powi(2) + g.dot(&cg));
@@ -113,7 +113,7 @@ impl Knowledge {
     }
 
     /// Largest deviation over its request; at most 1 if all requests are met.
-    pub fn worst(&self, asked: &TargetUncertainties) -> f64 {
+    pub(crate) fn worst(&self, asked: &TargetUncertainties) -> f64 {
         let shares = asked
             .by
             .iter()
@@ -144,7 +144,7 @@ impl Knowledge {
     /// gain.
     ///
     /// - `touch`: of a candidate.
-    pub fn best<M: SurfaceModel, T>(
+    pub(crate) fn best<M: SurfaceModel, T>(
         &self,
         surface: &M,
         candidates: impl IntoIterator<Item = T>,
@@ -161,3 +161,6 @@ impl Knowledge {
         best.map(|(gain, candidate)| (candidate, gain))
     }
 }
+
+#[cfg(test)]
+mod tests;

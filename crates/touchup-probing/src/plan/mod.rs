@@ -1,6 +1,6 @@
 //! Choice of the next touch.
 //!
-//! [`Knowledge`] is the covariance of a surface after its touches, and predicts the gain of one
+//! `Knowledge` is the covariance of a surface after its touches, and predicts the gain of one
 //! more: the next touch reduces the uncertainty of the requested number most. [`Explorer`] finds a
 //! feature from a flag and measures it this way; a [`Slide`] covers all of it, for the mesh.
 
@@ -23,7 +23,6 @@ mod tolerance;
 pub use advice::{NextTouch, advise_next_touch};
 pub use arm_uncertainty::ArmUncertainty;
 pub use decision::{DecidedCharacteristic, DecisionGoal, SoughtCharacteristic};
-pub use design::{Candidate, Knowledge, TargetUncertainties};
 pub use error::ExploreError;
 pub use explorer::{ExplorationResult, Explorer};
 pub use search_context::{ExpectedTravel, FeatureQuantity, PatternParams, TouchPlan, TouchResult};

@@ -14,10 +14,10 @@ reported! {
     #[derive(Clone)]
     pub struct StiffnessFound, pub fn of(found: &Repeatability) {
         touches: usize = found.touches.len(),
-        stiffness_n_per_mm: f64 = found.stiffness()[0] / 1e3,
-        std_n_per_mm: f64 = found.stiffness()[1] / 1e3,
+        stiffness_n_per_mm: f64 = found.stiffness[0] / 1e3,
+        std_n_per_mm: f64 = found.stiffness[1] / 1e3,
         /// range of the contact positions on the spot
-        range_um: f64 = found.range() * 1e6,
+        range_um: f64 = found.range * 1e6,
     }
 }
 

@@ -201,7 +201,7 @@ impl Engine {
     pub fn answer(&mut self, sample: &Sample) -> Result<Update, LiveError> {
         self.follow()?;
         let update = self.refiner.push(sample)?;
-        self.answered = self.refiner.contact().copied();
+        self.answered = self.refiner.contacts().latest().copied();
         self.since_replay
             .iter_mut()
             .for_each(|since| since.push(sample));
@@ -395,7 +395,8 @@ impl Engine {
         let EvidenceReplay { contacts, patcher } = replay;
         let last_ns = self
             .refiner
-            .contact()
+            .contacts()
+            .latest()
             .map_or(i64::MIN, |contact| contact.tip.stamp_ns);
         self.refiner.set_contacts(contacts);
         renewals.replace(patcher, last_ns).map(|()| 0)

@@ -583,7 +583,7 @@ impl SampleConsumer {
 
     fn contact(&self) -> Option<&ContactSample> {
         match self {
-            Self::Moving(engine) => engine.refiner().contact(),
+            Self::Moving(engine) => engine.refiner().contacts().latest(),
             Self::Keeping { evidence, .. } => evidence.contacts().latest(),
         }
     }
@@ -626,7 +626,7 @@ impl SampleConsumer {
         let ended = engine.finish()?;
         Ok(EndOfSamples {
             counts: *ended.refiner.counts(),
-            friction: ended.refiner.friction(),
+            friction: ended.refiner.contacts().friction(),
             result: ended.into_result(),
             live: real_time.map(|real_time| LiveSummary::of(&real_time.behind, live_counts)),
         })

@@ -128,7 +128,7 @@ fn touches_at_the_end_of_time_are_taken() {
                 ..sample(0, Point3::new(0.0, 0.0, RADIUS), Vector3::z() * 2.0)
             })
             .unwrap();
-        patcher.push(refiner.contact().unwrap());
+        patcher.push(refiner.contacts().latest().unwrap());
     }
     patcher.flush();
     assert_eq!(patcher.strokes(), 1);
@@ -285,7 +285,7 @@ fn settings_without_a_meaning_are_refused() {
     }
     assert!(taken.is_empty(), "taken: {}", taken.join(", "));
     for params in [RefineParams::robust(BALL), RefineParams::paper(BALL)] {
-        params.check().unwrap();
+        Refiner::new(bumpy(0), params).unwrap();
     }
 }
 

@@ -115,7 +115,7 @@ fn carving_moves_the_corners_of_one_face() {
             let mismatch = update.mismatch.unwrap();
             let [a, b, c] = before.triangle(mismatch.face);
             let n = (b - a).cross(&(c - a)).normalize();
-            let smoothed = refiner.contact().unwrap().ball.centre;
+            let smoothed = refiner.contacts().latest().unwrap().ball.centre;
             let h = (smoothed - n * RADIUS - Point3::from((a.coords + b.coords + c.coords) / 3.0))
                 .dot(&n);
             assert!(

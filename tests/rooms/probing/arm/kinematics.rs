@@ -8,7 +8,8 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 use touchup::probing::arm::{
-    Arm, Command, OnsetError, OnsetParams, OnsetVerdict, TouchMoment, UrGeometry, find_onset,
+    Arm, ArmGeometry, Command, OnsetError, OnsetParams, OnsetVerdict, TouchMoment, UrGeometry,
+    find_onset,
 };
 use touchup::sim::{ArmParams, Plate, SimArm, WEIGHTLESS};
 use touchup::stylus::Payload;
@@ -351,23 +352,23 @@ fn joints() -> impl Strategy<Value = [f64; 6]> {
 proptest! {
     #[test]
     fn the_flange_is_where_the_matrices_have_it(joints in joints(), arm in 0..4usize) {
-        let difference = ARMS[arm].flange(&joints).to_homogeneous() - by_matrices(&ARMS[arm], &joints);
+        let difference = ArmGeometry::from(ARMS[arm]).flange(&joints.into()).to_homogeneous() - by_matrices(&ARMS[arm], &joints);
         prop_assert!(difference.norm() < 1e-14, "{difference}");
     }
 
     /// Each solution brings the flange there, and the joints that it came from are among them.
     #[test]
     fn the_inverse_brings_it_there(joints in joints(), arm in 0..4usize) {
-        let arm = ARMS[arm];
-        prop_assume!(arm.dexterity(&joints) > 1e-4);
-        let pose = arm.flange(&joints);
-        let found = arm.inverse(&pose, &joints);
+        let (ur, arm) = (ARMS[arm], ArmGeometry::from(ARMS[arm]));
+        prop_assume!(arm.dexterity(&joints.into()) > 1e-4);
+        let pose = arm.flange(&joints.into());
+        let found = ur.inverse(&pose, &joints);
         prop_assert!((1..=8).contains(&found.len()));
         let turn = |a: f64, b: f64| (a - b + PI).rem_euclid(2.0 * PI) - PI;
         let is_it = |other: &[f64; 6]| other.iter().zip(&joints).all(|(a, b)| turn(*a, *b).abs() < 1e-6);
         prop_assert!(found.iter().any(is_it), "{found:?}");
         for solution in &found {
-            let error = pose.inv_mul(&arm.flange(solution));
+            let error = pose.inv_mul(&arm.flange(&(*solution).into()));
             prop_assert!(error.translation.vector.norm() < 1e-9 && error.rotation.angle() < 1e-7, "{error}");
         }
     }
@@ -375,13 +376,13 @@ proptest! {
     /// Against differences of the flange's pose.
     #[test]
     fn the_jacobian_is_the_slope_of_the_flange(joints in joints(), arm in 0..4usize) {
-        let (arm, step) = (ARMS[arm], 1e-6);
-        let jacobian = arm.jacobian(&joints);
+        let (arm, step) = (ArmGeometry::from(ARMS[arm]), 1e-6);
+        let jacobian = arm.jacobian(&joints.into());
         for column in 0..6 {
             let moved = |by: f64| {
                 let mut moved = joints;
                 moved[column] += by;
-                arm.flange(&moved)
+                arm.flange(&moved.into())
             };
             let (back, forth) = (moved(-step), moved(step));
             let linear = (forth.translation.vector - back.translation.vector) / (2.0 * step);
@@ -406,13 +407,13 @@ proptest! {
 /// parallel.
 #[test]
 fn where_an_arm_is_stuck_it_has_no_dexterity() {
-    let arm = UrGeometry::UR5E;
+    let arm = ArmGeometry::from(UrGeometry::UR5E);
     let somewhere = [0.3, -1.2, 1.4, -0.9, 1.1, 0.4];
-    assert!(arm.dexterity(&somewhere) > 0.01);
+    assert!(arm.dexterity(&somewhere.into()) > 0.01);
     let [stretched, straight_wrist] = [(2, 0.0), (4, 0.0)].map(|(joint, angle)| {
         let mut joints = somewhere;
         joints[joint] = angle;
-        arm.dexterity(&joints)
+        arm.dexterity(&joints.into())
     });
     assert!(
         stretched < 1e-12 && straight_wrist < 1e-12,
@@ -420,7 +421,7 @@ fn where_an_arm_is_stuck_it_has_no_dexterity() {
     );
     let mut rng = Pcg64::seed_from_u64(3);
     let most = (0..1000)
-        .map(|_| arm.dexterity(&[(); 6].map(|()| rng.random_range(-PI..PI))))
+        .map(|_| arm.dexterity(&[(); 6].map(|()| rng.random_range(-PI..PI)).into()))
         .fold(0.0, f64::max);
     assert!(most < 2.0, "lengths are in units of the arm: {most}");
 }

@@ -42,9 +42,10 @@ fn probed(
             place: (*place).into(),
             radius: 3e-3,
         };
-        let mut prober = Prober::new(&mut arm, &cell, &params, &mut world).beside(references);
+        let mut prober = Prober::new(&mut arm, &cell, &params, &mut world);
+        prober.references = references;
         all.push(prober.probe(&flag));
-        references = prober.take_references();
+        references = prober.references;
         if matches!(all[all.len() - 1].ending, Ending::Stopped(_)) {
             break;
         }

@@ -134,13 +134,13 @@ fn a_hole_in_which_the_arm_was_stopped_is_probed_to_the_end_when_it_is_flagged_i
     };
     let mut prober = Prober::new(&mut arm, &cell, &params, &mut world);
     let stopped = prober.probe(&hole(12e-3));
-    let way_out = prober.into_way_out();
+    let way_out = prober.way_out;
     assert_eq!(stopped.ending, Ending::Cancelled(StopRequest::Stay));
     assert!(stopped.touches.len() > 4 && way_out.is_some());
     world.stays_after = None;
-    let probed = Prober::new(&mut arm, &cell, &params, &mut world)
-        .leaving_by(way_out)
-        .probe(&hole(8e-3));
+    let mut prober = Prober::new(&mut arm, &cell, &params, &mut world);
+    prober.way_out = way_out;
+    let probed = prober.probe(&hole(8e-3));
     assert_eq!(probed.ending, Ending::ToleranceReached);
     assert!(
         (diameter(&probed).unwrap() - 8e-3).abs() < 50e-6,

@@ -50,7 +50,7 @@ fn stopped(arm: &mut SimArm, stays_after: usize) -> (Point3<f64>, Option<WayOut>
         Ending::Cancelled(StopRequest::Stay),
         "{stays_after}"
     );
-    let way_out = prober.into_way_out();
+    let way_out = prober.way_out;
     (arm.ball(), way_out)
 }
 
@@ -71,9 +71,9 @@ fn is_inside(place: &Point3<f64>) -> bool {
 /// Probes on from there, to its end.
 fn goes_on(arm: &mut SimArm, way_out: Option<WayOut>) -> (Ending, f64) {
     let (cell, params, mut world) = (cell(), params(), stopping(None));
-    let probed = Prober::new(arm, &cell, &params, &mut world)
-        .leaving_by(way_out)
-        .probe(&HOLE);
+    let mut prober = Prober::new(arm, &cell, &params, &mut world);
+    prober.way_out = way_out;
+    let probed = prober.probe(&HOLE);
     let found = probed
         .found
         .and_then(|found| found.feature)
@@ -156,10 +156,11 @@ fn a_way_out_that_is_broken_off_remains_from_where_it_was() {
     let plate = Plate::default();
     let (mut arm, place, way_out) = stopped_inside(&plate);
     let (cell, params, mut world) = (cell(), params(), stopping(Some(60)));
-    let mut prober = Prober::new(&mut arm, &cell, &params, &mut world).leaving_by(Some(way_out));
+    let mut prober = Prober::new(&mut arm, &cell, &params, &mut world);
+    prober.way_out = Some(way_out);
     let probed = prober.probe(&HOLE);
     assert_eq!(probed.ending, Ending::Cancelled(StopRequest::Stay));
-    let way_out = prober.into_way_out();
+    let way_out = prober.way_out;
     assert!(way_out.is_some());
     let on_the_way = arm.ball();
     assert!(on_the_way.z > place.z - 0.2e-3, "{on_the_way} from {place}");

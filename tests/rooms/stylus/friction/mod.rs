@@ -9,8 +9,8 @@ use touchup::sim::{
     Bounds, SensorParams, Stroke, StylusParams, Surface, SurfacePoint, TrueState, touch,
 };
 use touchup::stylus::{
-    ContactEstimator, ContactEstimatorParams, Friction, FrictionCoefficient, LocalMotion, Sample,
-    Sliding, SyncParams, Synchroniser, TipParams, Wrench,
+    ContactEstimator, ContactEstimatorParams, Friction, FrictionCoefficient, Sample, Sliding,
+    SyncParams, Synchroniser, TipParams, Wrench,
 };
 
 mod measured;
@@ -406,27 +406,4 @@ fn a_force_that_no_friction_explains_makes_the_normal_uncertain() {
     let stopped = friction.normal(&sliding(1.0, 0.5e-3)).unwrap();
     assert!(believed.sigma < 2f64.to_radians(), "{}", believed.sigma);
     assert!(stopped.sigma > 30f64.to_radians(), "{}", stopped.sigma);
-}
-
-#[test]
-fn a_parabola_is_found_exactly_and_its_errors_are_those_of_least_squares() {
-    let at = |t: f64| Point3::new(0.02 * t, 0.5 * t * t, 1e-3 + 0.01 * t - 0.3 * t * t);
-    let mut sums = LocalMotion::new(at(0.1), 0.016);
-    (-16..=16).for_each(|i| sums.add(f64::from(i) * 1e-3, &at(0.1 + f64::from(i) * 1e-3)));
-    let motion = sums.motion();
-    assert!((motion.centre - at(0.1)).norm() < 1e-15);
-    assert!((motion.velocity - Vector3::new(0.02, 0.1, 0.01 - 0.06)).norm() < 1e-12);
-    assert!(motion.residual < 1e-10);
-    // in a window as long before as after, the slope varies by σ / √Σ t²
-    let squares: f64 = (-16..=16).map(|i| (f64::from(i) * 1e-3).powi(2)).sum();
-    assert!((motion.velocity_gain * squares.sqrt() - 1.0).abs() < 1e-9);
-}
-
-#[test]
-fn three_positions_give_no_velocity() {
-    let mut sums = LocalMotion::new(Point3::origin(), 0.016);
-    (0..3).for_each(|i| sums.add(f64::from(i) * 1e-3, &Point3::new(f64::from(i), 0.0, 0.0)));
-    let motion = sums.motion();
-    assert_eq!((motion.velocity, motion.centre.x), (Vector3::zeros(), 1.0));
-    assert!(motion.velocity_gain.is_infinite() && motion.residual.is_infinite());
 }

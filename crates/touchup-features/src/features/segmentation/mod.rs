@@ -1,15 +1,15 @@
 //! Segments of a mesh: pieces of one surface each, their edges and curvature.
 
-pub mod bodies;
+pub(super) mod bodies;
 pub mod clusters;
-pub mod creases;
+pub(super) mod creases;
 pub mod curvature;
-pub mod facets;
-pub mod flats;
-pub mod grow;
-pub mod k_means;
-pub mod marks;
-pub mod primitive;
-pub mod rays;
-pub mod scene;
-pub mod segment;
+pub(super) mod facets;
+pub(super) mod flats;
+pub(super) mod grow;
+pub(super) mod k_means;
+pub(super) mod marks;
+pub(super) mod primitive;
+pub(super) mod rays;
+pub(super) mod scene;
+pub(super) mod segment;

@@ -148,7 +148,7 @@ impl ContactModel {
 
     /// Whether F·n exceeds the model: [`Self::rigid_offset`], and a step that takes the offset out,
     /// then use [`LARGEST_SHARE`] · f_max instead; any other step lets the face escape.
-    pub fn clamps(&self, force_n: f64) -> bool {
+    pub(crate) fn clamps(&self, force_n: f64) -> bool {
         matches!(*self, Self::Sigmoid(curve) if force_n > LARGEST_SHARE * curve.f_max)
     }
 
@@ -273,4 +273,19 @@ fn phi(z: f64) -> (f64, f64) {
     }
     let phi1 = z.exp_m1() / z;
     (phi1, (phi1 - 1.0) / z)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn forces_above_the_largest_share_are_clamped() {
+        let curve = SigmoidParams {
+            f_max: 10.0,
+            ..SigmoidParams::default()
+        };
+        let model = ContactModel::Sigmoid(curve);
+        assert!(!model.clamps(9.89) && model.clamps(9.91));
+    }
 }

@@ -35,7 +35,7 @@ pub(super) struct OrientedPoints {
 }
 
 impl OrientedPoints {
-    pub fn new(
+    pub(crate) fn new(
         positions: Vec<Point3<f64>>,
         normals: Vec<Vector3<f64>>,
         spacing: f64,

@@ -44,7 +44,7 @@ pub(crate) enum ContactVerdict {
 
 /// Outlier gate.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct GateParams {
+pub(crate) struct GateParams {
     /// standard deviations beyond which a contact contradicts
     pub sigmas: f64,
     /// contacts of one place within this time share their noise, ns: the longest smoothing window
@@ -150,7 +150,7 @@ impl ContactMap {
     /// An empty map with cells of edge `cell` (m), for queries up to `reach` (m).
     ///
     /// - `gate`: criterion for rejection; `None`: never.
-    pub fn new(cell: f64, reach: f64, gate: Option<GateParams>) -> Self {
+    pub(crate) fn new(cell: f64, reach: f64, gate: Option<GateParams>) -> Self {
         Self {
             cell,
             reach,

@@ -73,7 +73,7 @@ impl VoxelElement for TipPlace {
 impl FreeSpace {
     /// Empty, with one place for each cube of edge `cell` (m); queries of a ball go up to `reach`
     /// (m).
-    pub fn new(tip: TipBody, cell: f64, reach: f64) -> Self {
+    pub(crate) fn new(tip: TipBody, cell: f64, reach: f64) -> Self {
         let body = (!tip.is_ball()).then(|| SweptVolume {
             tip,
             places: VoxelSet::new(cell),

@@ -55,7 +55,7 @@ pub(in crate::reconstruct) const SWEPT_REACH: f64 = 0.067;
 
 impl EvidenceParams {
     /// Settings for a ball of `radius` (m) and a scan with points off by `noise` (m).
-    pub fn new(radius: f64, noise: f64) -> Self {
+    pub(crate) fn new(radius: f64, noise: f64) -> Self {
         Self {
             radius,
             field: FieldParams::for_ball(radius),

@@ -46,7 +46,7 @@ impl ProbedLog {
     /// An empty log.
     ///
     /// - `ball`: radius of a ball tip, m.
-    pub fn new(ball: Option<f64>) -> Self {
+    pub(crate) fn new(ball: Option<f64>) -> Self {
         Self {
             ball,
             points: Vec::new(),

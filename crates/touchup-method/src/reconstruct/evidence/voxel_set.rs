@@ -30,7 +30,7 @@ pub(in crate::reconstruct) struct VoxelSet<T: VoxelElement> {
 
 impl<T: VoxelElement> VoxelSet<T> {
     /// An empty set, with small cells of edge `cell` (m).
-    pub fn new(cell: f64) -> Self {
+    pub(crate) fn new(cell: f64) -> Self {
         Self {
             cell,
             is_kept: CellTable::default(),

@@ -63,7 +63,7 @@ const NEAR: f64 = 1.1;
 
 impl ReconstructionGrid {
     /// A grid without nodes.
-    pub fn new(lattice: Lattice) -> Self {
+    pub(crate) fn new(lattice: Lattice) -> Self {
         Self {
             lattice,
             ..Self::default()

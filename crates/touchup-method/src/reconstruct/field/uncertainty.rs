@@ -281,7 +281,8 @@ mod tests {
     use nalgebra::Vector3;
 
     use super::*;
-    use crate::reconstruct::{ContactSigma, GateParams, SurfaceContact};
+    use crate::reconstruct::evidence::contact_map::GateParams;
+    use crate::reconstruct::{ContactSigma, SurfaceContact};
 
     const WINDOW_NS: i64 = 64_000_000;
 

@@ -3,5 +3,5 @@
 pub(in crate::reconstruct) mod delta;
 pub(in crate::reconstruct) mod patcher;
 pub(in crate::reconstruct) mod remesh;
-pub mod splice;
+pub(super) mod splice;
 pub(in crate::reconstruct) mod update;

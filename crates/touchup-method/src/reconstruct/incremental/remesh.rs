@@ -51,7 +51,7 @@ pub(in crate::reconstruct) struct RenewedFaces {
 
 impl Remesh {
     /// Without faces.
-    pub fn new(lattice: Lattice) -> Self {
+    pub(crate) fn new(lattice: Lattice) -> Self {
         Self {
             grid: ReconstructionGrid::new(lattice),
             ..Self::default()

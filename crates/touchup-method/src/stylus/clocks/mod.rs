@@ -1,5 +1,5 @@
 //! Clocks of pose and wrench: their delay, from motion and force.
 
-pub mod clock;
-pub mod clock_offset;
-pub mod course_clock;
+pub(super) mod clock;
+pub(super) mod clock_offset;
+pub(super) mod course_clock;

@@ -106,7 +106,7 @@ impl MarkerBody {
     }
 
     /// Mean of the markers, m, in T.
-    pub fn centroid_t(&self) -> Point3<f64> {
+    pub(crate) fn centroid_t(&self) -> Point3<f64> {
         self.centroid_t
     }
 

@@ -9,17 +9,6 @@ use crate::stylus::stream::Stream;
 use crate::stylus::sync::interpolated;
 use crate::stylus::{SettingError, StampedPose, SyncCounts, SyncParams};
 
-/// Knowledge of the pose.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Tracking {
-    /// The markers determine it.
-    Held,
-    /// They did a moment ago; the body flies on.
-    Coasting,
-    /// No pose.
-    Lost,
-}
-
 /// Frames and markers by outcome.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct MarkerCounts {
@@ -124,15 +113,6 @@ impl MarkerFilter {
         }
     }
 
-    /// State as of the last frame in use.
-    pub fn tracking(&self) -> Tracking {
-        match &self.tracked {
-            None => Tracking::Lost,
-            Some(tracked) if tracked.held_ns == tracked.stamp_ns => Tracking::Held,
-            Some(_) => Tracking::Coasting,
-        }
-    }
-
     /// Frames and markers by outcome.
     pub fn counts(&self) -> &MarkerCounts {
         &self.counts
@@ -161,10 +141,10 @@ impl MarkerFilter {
             }),
             _ => {}
         }
-        let count = match self.tracking() {
-            Tracking::Held => &mut self.counts.held,
-            Tracking::Coasting => &mut self.counts.coasting,
-            Tracking::Lost => &mut self.counts.lost,
+        let count = match &self.tracked {
+            None => &mut self.counts.lost,
+            Some(tracked) if tracked.held_ns == tracked.stamp_ns => &mut self.counts.held,
+            Some(_) => &mut self.counts.coasting,
         };
         *count += 1;
     }

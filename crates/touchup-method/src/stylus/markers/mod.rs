@@ -11,7 +11,7 @@ mod filter;
 mod motion;
 
 pub use body::MarkerBody;
-pub use filter::{MarkerCounts, MarkerFilter, Tracking};
+pub use filter::{MarkerCounts, MarkerFilter};
 pub use motion::SpringParams;
 
 use nalgebra::Point3;

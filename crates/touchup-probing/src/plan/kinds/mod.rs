@@ -1,10 +1,10 @@
 //! Exploration of each kind of feature, and its fits.
 
-pub mod boss;
-pub mod cylinder_fit;
-pub mod edge;
-pub mod hole;
-pub mod plane;
-pub mod region;
-pub mod slot;
-pub mod slot_fit;
+pub(super) mod boss;
+pub(super) mod cylinder_fit;
+pub(super) mod edge;
+pub(super) mod hole;
+pub(super) mod plane;
+pub(super) mod region;
+pub(super) mod slot;
+pub(super) mod slot_fit;
