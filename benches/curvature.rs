@@ -4,9 +4,9 @@ use divan::{Bencher, black_box};
 use nalgebra::Point3;
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
-use touchup::features::clusters::{ClusterParams, clusters};
-use touchup::features::curvature::curvature;
+use touchup::features::curvature;
 use touchup::features::k_means;
+use touchup::features::{ClusterParams, clusters};
 use touchup::mesh::{FaceId, TriMesh};
 
 fn main() {

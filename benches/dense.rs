@@ -19,11 +19,12 @@ use std::time::{Duration, Instant};
 
 use memory::resident;
 use sliding::{SCAN_NOISE, percentile};
-use touchup::haptic::{RefineParams, TipParams};
+use touchup::haptic::RefineParams;
 use touchup::live::{Engine, Gate, Pace, Renewal};
 use touchup::mesh::FaceTree;
 use touchup::reconstruct::PatcherParams;
 use touchup::sim::wavy::{RADIUS, STIFFNESS, noisy_slide_on, plate};
+use touchup::stylus::TipParams;
 
 /// Edge lengths, in radii of the tip.
 const EDGES: [f64; 6] = [1.0 / 30.0, 0.1, 0.25, 0.5, 1.0, 2.0];

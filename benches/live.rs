@@ -17,11 +17,12 @@ use std::time::{Duration, Instant};
 
 use memory::resident;
 use sliding::{SCAN_NOISE, percentile};
-use touchup::haptic::{RefineParams, TipParams};
+use touchup::haptic::RefineParams;
 use touchup::live::{Engine, Gate, Pace, Renewal};
 use touchup::mesh::FaceTree;
 use touchup::reconstruct::PatcherParams;
 use touchup::sim::wavy::{RADIUS, SIDE, STEP_NS, STIFFNESS, noisy_slide_on, wavy_plate};
+use touchup::stylus::TipParams;
 
 /// Width of the raster, m: passed over each 4.6 minutes.
 const WIDTH: f64 = 40e-3;

@@ -11,9 +11,10 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use nalgebra::{Point3, Vector3};
-use touchup::haptic::{RefineParams, Refiner, RoiSize, TipParams};
+use touchup::haptic::{RefineParams, Refiner, RoiSize};
 use touchup::mesh::{FaceTree, TriMesh, triangle};
 use touchup::sim::wavy::{RADIUS, SIDE, STIFFNESS, slide, wavy_plate};
+use touchup::stylus::TipParams;
 use touchup_report::cost::MinimalLoop;
 
 /// Width of the raster, m.

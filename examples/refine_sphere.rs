@@ -5,10 +5,10 @@
 use std::f64::consts::TAU;
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
-use touchup::haptic::{RefineParams, Refiner, TipParams};
+use touchup::haptic::{RefineParams, Refiner};
 use touchup::mesh::TriMesh;
 use touchup::sim::add_vertex_noise;
-use touchup::stylus::{Sample, Wrench};
+use touchup::stylus::{Sample, TipParams, Wrench};
 
 /// Of the sphere, m.
 const RADIUS: f64 = 20e-3;

@@ -6,10 +6,10 @@
 use std::iter::from_fn;
 use std::path::Path;
 
-use touchup::haptic::{RefineParams, Refiner, TipParams};
+use touchup::haptic::{RefineParams, Refiner};
 use touchup::io::mesh_file::{MeshUnit, read_mesh, write_mesh};
 use touchup::io::recording::{RecordingReader, Topics};
-use touchup::stylus::{SyncParams, Synchroniser};
+use touchup::stylus::{SyncParams, Synchroniser, TipParams};
 
 fn main() -> anyhow::Result<()> {
     let arguments: Vec<_> = std::env::args().skip(1).collect();

@@ -15,8 +15,7 @@ use arbitrary::{Result, Unstructured};
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use touchup_geometry::mesh::{TriMesh, is_place, repair};
 use touchup_io::recording::{Record, RecordingLayout, RecordingReader};
-use touchup_method::haptic::TipParams;
-use touchup_method::stylus::{Message, Sample, Wrench};
+use touchup_method::stylus::{Message, Sample, TipParams, Wrench};
 
 /// The ball of the targets: radius in m, stiffness in N/m.
 pub const BALL: TipParams = TipParams {

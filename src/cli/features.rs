@@ -8,10 +8,8 @@ use clap::{Args, ValueEnum};
 
 use super::common::progress::WorkProgress;
 use super::{CliError, Losses, check_kept, counted, print_report, require};
-use touchup_features::features::clusters::{
-    Cluster, ClusterParams, PaperParams, clusters, paper_clusters,
-};
-use touchup_features::features::curvature::curvature;
+use touchup_features::features::curvature;
+use touchup_features::features::{Cluster, ClusterParams, PaperParams, clusters, paper_clusters};
 use touchup_features::features::{Detection, Feature, FeatureKind, FittedTo, Form, MeasuredValue};
 use touchup_geometry::mesh::TriMesh;
 use touchup_io::features_file::FeatureFile;

@@ -3,11 +3,11 @@
 use nalgebra::{Isometry3, Point3, Vector3};
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
-use touchup::haptic::{GuardParams, RefineParams, Refiner, RoiSize, TipParams};
+use touchup::haptic::{GuardParams, RefineParams, Refiner, RoiSize};
 use touchup::mesh::TriMesh;
 use touchup::stylus::{
     BiasParams, MarkerBody, MarkerFilter, MarkerFrame, MarkerObservation, MarkerParams, Sample,
-    StampedPose, Wrench,
+    StampedPose, TipParams, Wrench,
 };
 use touchup_report::allocations::asked;
 

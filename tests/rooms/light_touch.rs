@@ -6,11 +6,11 @@ use std::fs;
 use nalgebra::{Isometry3, Point3, Vector3};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
-use touchup::haptic::{RefineParams, Refiner, TipParams};
+use touchup::haptic::{RefineParams, Refiner};
 use touchup::live::{Engine, Renewal};
 use touchup::mesh::{FaceTree, TriMesh};
 use touchup::reconstruct::PatcherParams;
-use touchup::stylus::{Sample, Wrench};
+use touchup::stylus::{Sample, TipParams, Wrench};
 
 use crate::common::grid;
 

@@ -5,12 +5,12 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use nalgebra::Point3;
-use touchup::haptic::{RefineParams, Refiner, TipParams, Update};
+use touchup::haptic::{RefineParams, Refiner, Update};
 use touchup::live::{Engine, Gate, GateKeeper, LiveCounts, Pace, Renewal};
 use touchup::mesh::{FaceId, FaceTree, TriMesh, VertexId};
 use touchup::reconstruct::{PatchDelta, Patcher, PatcherParams, Splice};
 use touchup::sim::StylusParams;
-use touchup::stylus::{BiasParams, ContactSample, ProbedPoint, Sample};
+use touchup::stylus::{BiasParams, ContactSample, ProbedPoint, Sample, TipParams};
 
 use crate::full::either;
 use crate::plate_stream::{PlateStream, contacts_of, plate_stream};

@@ -8,7 +8,7 @@ use nalgebra::{Point3, vector};
 use proptest::prelude::*;
 use touchup::haptic::{
     ContactModel, DynamicsParams, MotionDirection, RefineParams, Refiner, RoiSize, SigmoidParams,
-    StepRule, TipParams,
+    StepRule,
 };
 use touchup::io::mesh_file::MeshUnit;
 use touchup::io::recording::TableColumns;
@@ -18,7 +18,9 @@ use touchup::scene::{
     CompensationSection, GravityAxes, LeftOut, MarkersSection, Mode, PayloadSection, RobotSection,
     ScanToSpaceSection, Scene, SceneError, Setting,
 };
-use touchup::stylus::{BiasParams, SensorBias, SensorMount, SyncParams, TipShape, WrenchFrame};
+use touchup::stylus::{
+    BiasParams, SensorBias, SensorMount, SyncParams, TipParams, TipShape, WrenchFrame,
+};
 
 const DEFAULT_YAML: &str = include_str!("../../config/default.yaml");
 

@@ -11,7 +11,7 @@ use serde_json::Value;
 
 use super::file_error::{FileError, read_file, write_file};
 use touchup_features::conformity::MeasuredNumber;
-use touchup_features::features::clusters::{Bend, Cluster};
+use touchup_features::features::{Bend, Cluster};
 use touchup_features::features::{
     Feature, Form, InspectedQuantity, MeasuredValue, Relation, relations,
 };

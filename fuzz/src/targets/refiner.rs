@@ -4,10 +4,8 @@ use crate::{BALL, assert_is_somewhere, closed_box, sample, vector};
 use arbitrary::{Result, Unstructured};
 use nalgebra::Point3;
 use touchup_geometry::mesh::TriMesh;
-use touchup_method::haptic::{
-    DynamicsParams, GuardParams, RefineParams, Refiner, StepRule, TipParams,
-};
-use touchup_method::stylus::TipShape;
+use touchup_method::haptic::{DynamicsParams, GuardParams, RefineParams, Refiner, StepRule};
+use touchup_method::stylus::{TipParams, TipShape};
 
 /// A box, or triangles in a fan: needles, points that coincide, faces without area.
 fn part(bytes: &mut Unstructured) -> Result<Option<TriMesh>> {

@@ -3,11 +3,11 @@
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Vector3};
-use touchup::haptic::{RefineParams, TipParams};
+use touchup::haptic::RefineParams;
 use touchup::live::{Engine, Gate, Pace, Renewal};
 use touchup::mesh::{Changes, FaceTree, TriMesh, VertexId};
 use touchup::reconstruct::{PatcherParams, Support};
-use touchup::stylus::{Sample, Wrench};
+use touchup::stylus::{Sample, TipParams, Wrench};
 
 use crate::common::grid;
 use crate::soundness::intersections;

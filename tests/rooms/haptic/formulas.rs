@@ -4,13 +4,13 @@
 
 use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
 use proptest::prelude::*;
-use touchup::haptic::dynamics::turn;
+use touchup::haptic::turn;
 use touchup::haptic::{
     ContactModel, DynamicsParams, FaceDynamics, FaceState, MotionDirection, RefineParams, Refiner,
-    SigmoidParams, StepRule, TipParams,
+    SigmoidParams, StepRule,
 };
 use touchup::mesh::{TriMesh, VertexId};
-use touchup::stylus::{Sample, Wrench};
+use touchup::stylus::{Sample, TipParams, Wrench};
 
 use super::counted::{Counts, Shown, tried};
 

@@ -10,14 +10,16 @@ use rand::SeedableRng;
 use rand_pcg::Pcg64;
 use serde_json::Value;
 use tempfile::TempDir;
-use touchup::haptic::{RefineParams, TipParams};
+use touchup::haptic::RefineParams;
 use touchup::io::mesh_file::{MeshUnit, VertexColumn, read_mesh, write_mesh, write_mesh_with};
 use touchup::io::recording::{RecordingReader, Topics, write_recording};
 use touchup::live::{Engine, Renewal};
 use touchup::mesh::{FaceTree, TriMesh};
 use touchup::reconstruct::PatcherParams;
 use touchup::scan::read_scan;
-use touchup::stylus::{Message, StampedPose, StampedWrench, SyncParams, Synchroniser, Wrench};
+use touchup::stylus::{
+    Message, StampedPose, StampedWrench, SyncParams, Synchroniser, TipParams, Wrench,
+};
 
 use crate::common::{grid, within};
 use crate::shared::shared;

@@ -32,7 +32,7 @@ pub(super) fn on<M: SurfaceModel>(surface: &M, p: &Point3<f64>) -> Point3<f64> {
     (0..4).fold(*p, |p, _| p - normal_of(surface, &p) * surface.distance(&p))
 }
 
-/// Contact of a ball that is let down and then moved in a straight line until it meets the
+/// Contact of a ball that goes down and then in a straight line until it meets the
 /// material, exactly, with noise along its path; a path that is blocked before measures nothing.
 pub(super) fn probe(
     distance: &dyn Fn(&Point3<f64>) -> f64,

@@ -31,6 +31,9 @@ pub use from_fits::End;
 pub use measure::{LEAST_TOUCHES, LEAST_TURN};
 pub use quantity::InspectedQuantity;
 pub use relations::{Relation, RelationKind, relations};
+pub use segmentation::clusters::{
+    Bend, Cluster, ClusterParams, PaperParams, clusters, paper_clusters,
+};
+pub use segmentation::curvature::{VertexCurvature, VertexKind, curvature};
 pub use segmentation::k_means::{KMeans, k_means};
-pub use segmentation::{clusters, curvature};
 pub use track::Tracker;

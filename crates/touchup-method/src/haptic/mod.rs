@@ -7,7 +7,7 @@
 mod carve;
 mod collision;
 mod deform;
-pub mod dynamics;
+mod dynamics;
 mod fans;
 mod followed;
 mod guard;
@@ -23,16 +23,13 @@ use serde::Serialize;
 
 pub use deform::{Footprint, RegionFit};
 pub use dynamics::{
-    ContactModel, DynamicsError, DynamicsParams, FaceDynamics, FaceState, MotionDirection,
-    SigmoidParams, StepRule,
+    ContactModel, DynamicsError, DynamicsParams, FaceDynamics, FaceState, LARGEST_SHARE,
+    MotionDirection, RELATIVE_ERROR, SigmoidParams, StepRule, dormand_prince, turn,
 };
 pub use guard::GuardParams;
 pub use params::{CarveParams, RefineParams, ScanParams, ScanRegion, TouchPoint, relaxing_alpha};
 pub use registration::{Registrar, Registration, RegistrationError, RegistrationParams};
 pub use roi::RoiSize;
-
-/// Stylus settings in [`RefineParams`].
-pub use crate::stylus::{SlidingParams, TipParams};
 
 use crate::reconstruct::{PatchDelta, Support};
 use crate::stylus::{
@@ -40,7 +37,6 @@ use crate::stylus::{
     SettingError, TipBody, TipPlace, TouchState,
 };
 use deform::{DeformableMesh, HandleRegion};
-use dynamics::turn;
 use touchup_geometry::mesh::{
     BoxQuery, Changes, FaceHit, FaceId, MeshError, NearbyLeaves, TriMesh, VertexId,
 };
@@ -156,7 +152,7 @@ pub struct RefineCounts {
 /// ```
 /// use nalgebra::{Isometry3, Point3, Vector3};
 /// use touchup_geometry::mesh::TriMesh;
-/// use touchup_method::{haptic::*, stylus::{Sample, Wrench}};
+/// use touchup_method::{haptic::*, stylus::{Sample, TipParams, Wrench}};
 ///
 /// let p = |x, y| Point3::new(x, y, 0.0);
 /// let mesh = TriMesh::new(vec![p(0.0, 0.0), p(0.01, 0.0), p(0.0, 0.01)], vec![[0, 1, 2]])?;

@@ -4,9 +4,8 @@
 use nalgebra::{Point3, Vector3};
 
 use crate::error::MeasureResult;
-use touchup_method::haptic::{
-    DynamicsParams, FaceDynamics, FaceState, RefineError, RefineParams, TipParams,
-};
+use touchup_method::haptic::{DynamicsParams, FaceDynamics, FaceState, RefineError, RefineParams};
+use touchup_method::stylus::TipParams;
 use touchup_sim::coupled::GuidedStylus;
 
 /// Sample period, s.

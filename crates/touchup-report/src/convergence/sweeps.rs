@@ -6,8 +6,8 @@ use nalgebra::{Isometry3, Point2, Point3, Vector3};
 use super::errors::MeshErrors;
 use crate::error::MeasureResult;
 use touchup_geometry::mesh::TriMesh;
-use touchup_method::haptic::{GuardParams, RefineParams, Refiner, StepRule, TipParams};
-use touchup_method::stylus::{Sample, Wrench};
+use touchup_method::haptic::{GuardParams, RefineParams, Refiner, StepRule};
+use touchup_method::stylus::{Sample, TipParams, Wrench};
 use touchup_sim::coupled::GuidedStylus;
 use touchup_sim::{
     PathParams, Peaks, RasterDirection, RasterRegion, SensorParams, StylusParams, Surface,

@@ -4,8 +4,8 @@ use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::case::{CaseOutcome, Extreme, refused};
 use touchup_geometry::mesh::{MeshError, TriMesh};
-use touchup_method::haptic::{RefineError, RefineParams, Refiner, TipParams};
-use touchup_method::stylus::{Sample, SampleError, Wrench};
+use touchup_method::haptic::{RefineError, RefineParams, Refiner};
+use touchup_method::stylus::{Sample, SampleError, TipParams, Wrench};
 
 /// Longest leg of a triangle, m.
 const EDGE: f64 = 2e-3;

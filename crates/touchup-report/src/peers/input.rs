@@ -5,7 +5,8 @@ use nalgebra::Point3;
 use super::PeerTimes;
 use crate::{Effort, Spread, timed};
 use touchup_geometry::mesh::{FaceTree, MeshError, NearbyLeaves, TriMesh};
-use touchup_method::haptic::{RefineError, RefineParams, Refiner, TipParams};
+use touchup_method::haptic::{RefineError, RefineParams, Refiner};
+use touchup_method::stylus::TipParams;
 use touchup_sim::wavy::{RADIUS, SIDE, STIFFNESS, contact_on, slide, wavy_plate};
 
 /// Search radius beyond any query's distance from the plate, m.

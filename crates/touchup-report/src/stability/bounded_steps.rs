@@ -6,7 +6,7 @@ use rand_pcg::Pcg64;
 
 use super::face_runs::log_uniform;
 use crate::reference::{HeldFace, Reference};
-use touchup_method::haptic::dynamics::RELATIVE_ERROR;
+use touchup_method::haptic::RELATIVE_ERROR;
 use touchup_method::haptic::{
     ContactModel, DynamicsError, DynamicsParams, FaceDynamics, FaceState, MotionDirection,
     SigmoidParams, StepRule,

@@ -2,8 +2,8 @@
 
 use nalgebra::{Matrix4, Vector3, Vector4};
 
-use touchup_method::haptic::dynamics::{LARGEST_SHARE, turn};
 use touchup_method::haptic::{ContactModel, DynamicsParams, FaceDynamics, FaceState, StepRule};
+use touchup_method::haptic::{LARGEST_SHARE, turn};
 use touchup_method::names;
 
 /// Most Newton iterations of the implicit step.

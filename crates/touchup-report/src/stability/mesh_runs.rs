@@ -7,9 +7,9 @@ use rand_pcg::Pcg64;
 
 use super::face_runs::{RunEnding, goes_over, log_uniform};
 use touchup_geometry::mesh::{FaceId, TriMesh};
-use touchup_method::haptic::{RefineParams, Refiner, RegionFit, TipParams};
+use touchup_method::haptic::{RefineParams, Refiner, RegionFit};
 use touchup_method::names;
-use touchup_method::stylus::{Sample, Wrench};
+use touchup_method::stylus::{Sample, TipParams, Wrench};
 
 /// Cells along each side of the sheet.
 const CELLS: u32 = 12;

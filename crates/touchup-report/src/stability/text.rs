@@ -7,7 +7,7 @@ use super::{
 use crate::{Axis, Chapter, Drawing, Figure, Panel, Table, TableOf};
 use itertools::Itertools;
 use touchup_method::haptic::GuardParams;
-use touchup_method::haptic::dynamics::RELATIVE_ERROR;
+use touchup_method::haptic::RELATIVE_ERROR;
 
 /// Quantity in the maps.
 const SHARE_OF: &str = "stable runs";

@@ -8,10 +8,9 @@ use crate::convergence::region_over;
 use crate::error::{MeasureError, MeasureResult};
 use touchup_features::compare::{CompareError, TouchedRegion};
 use touchup_geometry::mesh::{FaceTree, TriMesh};
-use touchup_method::haptic::TipParams;
 use touchup_method::stylus::{
     CompensatorParams, ContactEstimator, ContactEstimatorParams, ContactGateParams, Sample,
-    SyncParams, Synchroniser,
+    SyncParams, Synchroniser, TipParams,
 };
 use touchup_sim::{
     PathParams, Peaks, Plate, RasterDirection, ScannerParams, SimError, Stroke, StylusParams,

@@ -7,7 +7,7 @@ use nalgebra::{Point3, Vector3};
 use super::problem::{Problem, State};
 use super::rosenbrock;
 use crate::Effort;
-use touchup_method::haptic::dynamics::dormand_prince;
+use touchup_method::haptic::dormand_prince;
 use touchup_method::haptic::{FaceDynamics, FaceState, StepRule};
 use touchup_method::names;
 
@@ -87,7 +87,7 @@ impl Method {
             (Self::Euler, SolverSetting::Steps(steps)) => euler(start, end, steps, rate),
             (Self::RungeKutta, SolverSetting::Steps(steps)) => runge_kutta(start, end, steps, rate),
             (Self::DormandPrince, SolverSetting::RelativeTolerance(relative)) => {
-                dormand_prince::integrate(start, end, scale, relative, rate).ok()?
+                dormand_prince(start, end, scale, relative, rate).ok()?
             }
             (Self::Rodas, SolverSetting::RelativeTolerance(relative)) => {
                 let jacobian = |y: &State| {

@@ -80,7 +80,7 @@ const CHANGE: (f64, f64) = (0.2, 6.0);
 const SAFETY: f64 = 0.9;
 
 /// Integrates dy/dt = `rate`(y), which does not depend on time, from 0 to `end`; `scale` and
-/// `relative` as in [`touchup_method::haptic::dynamics::dormand_prince::integrate`]. `None`: it gave
+/// `relative` as in [`touchup_method::haptic::dormand_prince`]. `None`: it gave
 /// up.
 pub fn integrate(
     start: State,

@@ -4,8 +4,7 @@
 use nalgebra::{Isometry3, Point3, Vector3};
 use touchup_features::compare::TouchedRegion;
 use touchup_geometry::mesh::{FaceTree, TriMesh, VertexId};
-use touchup_method::haptic::TipParams;
-use touchup_method::stylus::{CompensatorParams, Sample, Wrench};
+use touchup_method::stylus::{CompensatorParams, Sample, TipParams, Wrench};
 use touchup_report::convergence::{
     OneFaceRun, OneFaceSample, Rule, convergence, fit_decay, straight_line,
 };

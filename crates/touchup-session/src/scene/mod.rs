@@ -32,10 +32,12 @@ pub use sections::{
 use touchup_io::mesh_file::MeshUnit;
 use touchup_io::recording::TableColumns;
 use touchup_io::text_file::read_text;
-use touchup_method::haptic::{CarveParams, GuardParams, SlidingParams};
+use touchup_method::haptic::{CarveParams, GuardParams};
 use touchup_method::parameters;
 use touchup_method::reconstruct::{PatchParams, UncertaintyParams};
-use touchup_method::stylus::{BiasParams, ContactGateParams, SyncParams, TipBody, TipShape};
+use touchup_method::stylus::{
+    BiasParams, ContactGateParams, SlidingParams, SyncParams, TipBody, TipShape,
+};
 
 parameters! {
     /// The parts of a scene. `None`: not built. Those with a default are built unless the scene

@@ -11,11 +11,11 @@ use super::{
     RefineSection, ScanToSpaceSection, Scene, TipSection,
 };
 use touchup_features::diagnose::InputMonitorParams;
-use touchup_method::haptic::{ContactModel, RefineParams, RoiSize, TipParams, relaxing_alpha};
+use touchup_method::haptic::{ContactModel, RefineParams, RoiSize, relaxing_alpha};
 use touchup_method::reconstruct::{PatchParams, PatcherParams, UncertaintyParams};
 use touchup_method::stylus::{
     CompensatorParams, MarkerFilter, Placement, SensorBias, SettingError, SyncParams, TipBody,
-    TipShape, Wrench, WrenchFrame,
+    TipParams, TipShape, Wrench, WrenchFrame,
 };
 use touchup_probing::arm::{ArmGeometry, TouchParams};
 use touchup_probing::execute::{ProbeParams, RobotCell, Tool};

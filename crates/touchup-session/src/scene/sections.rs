@@ -9,10 +9,11 @@ use nalgebra::{Isometry3, Point3, Quaternion, UnitQuaternion, Vector3};
 use super::{CheckRecord, CheckRecordError, CheckStanding};
 use touchup_io::mesh_file::MeshUnit;
 use touchup_io::urdf::{ArmLinks, UrdfError, read_urdf};
-use touchup_method::haptic::{MotionDirection, ScanParams, SigmoidParams, StepRule, TipParams};
+use touchup_method::haptic::{MotionDirection, ScanParams, SigmoidParams, StepRule};
 use touchup_method::parameters;
 use touchup_method::stylus::{
-    MarkerBody, MarkerParams, Payload, SensorBias, SensorMount, SettingError, TipShape, TipSizes,
+    MarkerBody, MarkerParams, Payload, SensorBias, SensorMount, SettingError, TipParams, TipShape,
+    TipSizes,
 };
 use touchup_method::words;
 use touchup_probing::arm::{Limits, SerialChain, TouchParams, UrGeometry};

@@ -1,7 +1,7 @@
 //! Clusters against parts with creases that one can count by hand.
 
-use touchup::features::clusters::{Bend, ClusterParams, PaperParams, clusters, paper_clusters};
 use touchup::features::k_means;
+use touchup::features::{Bend, ClusterParams, PaperParams, clusters, paper_clusters};
 
 use super::*;
 
@@ -188,7 +188,7 @@ fn the_mode_of_the_paper_marks_by_curvature() {
     let found = paper_clusters(&mesh, &curvature(&mesh), &PaperParams::default());
     assert_eq!(found.len(), 5);
     for [x, y] in at {
-        let near = |c: &&touchup::features::clusters::Cluster| {
+        let near = |c: &&touchup::features::Cluster| {
             (c.center.x / MM - x).hypot(c.center.y / MM - y) < 0.2
         };
         assert_eq!(found.iter().filter(near).count(), 1, "{x} {y}");

@@ -11,7 +11,7 @@ use crate::shapes::{icosphere, subdivided, torus};
 use nalgebra::{Point3, Vector3};
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
-use touchup::features::curvature::{VertexKind, curvature};
+use touchup::features::{VertexKind, curvature};
 use touchup::mesh::TriMesh;
 
 const MM: f64 = 1e-3;

@@ -12,9 +12,9 @@ use nalgebra::{Isometry3, Point3, Vector3, vector};
 use proptest::prelude::*;
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
-use touchup::haptic::{CarveParams, RefineParams, Refiner, TipParams};
+use touchup::haptic::{CarveParams, RefineParams, Refiner};
 use touchup::mesh::{TriMesh, VertexId};
-use touchup::stylus::{Sample, TipShape, Wrench};
+use touchup::stylus::{Sample, TipParams, TipShape, Wrench};
 
 use crate::common::{grid, within};
 

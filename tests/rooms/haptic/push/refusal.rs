@@ -1,9 +1,9 @@
 //! Refused samples and settings.
 
 use super::*;
-use touchup::haptic::{DynamicsError, GuardParams, RefineError, RoiSize, SlidingParams, StepRule};
+use touchup::haptic::{DynamicsError, GuardParams, RefineError, RoiSize, StepRule};
 use touchup::reconstruct::{Patcher, PatcherParams};
-use touchup::stylus::{ContactGateParams, SampleError};
+use touchup::stylus::{ContactGateParams, SampleError, SlidingParams};
 
 /// Samples that no stylus can have sent after one at `tick`.
 fn bad_after(tick: i64) -> Vec<Sample> {

@@ -4,13 +4,11 @@
 //! `--run-ignored only` of nextest runs them; `--no-capture` shows the numbers.
 
 use nalgebra::{Isometry3, Point3, Vector3};
-use touchup::haptic::{
-    GuardParams, RefineCounts, RefineError, RefineParams, Refiner, StepRule, TipParams,
-};
+use touchup::haptic::{GuardParams, RefineCounts, RefineError, RefineParams, Refiner, StepRule};
 use touchup::mesh::{FaceId, TriMesh};
 use touchup::sim::Peaks;
 use touchup::sim::coupled::GuidedStylus;
-use touchup::stylus::{Sample, Wrench};
+use touchup::stylus::{Sample, TipParams, Wrench};
 use touchup_report::convergence::{
     BLOWN_UP, MeshErrors, PaperSweeps, RobustSweeps, noisy, raster_samples,
 };

@@ -1,9 +1,9 @@
 //! Segments of a mesh: pieces of one surface each, their edges and curvature.
 
 pub(super) mod bodies;
-pub mod clusters;
+pub(super) mod clusters;
 pub(super) mod creases;
-pub mod curvature;
+pub(super) mod curvature;
 pub(super) mod facets;
 pub(super) mod flats;
 pub(super) mod grow;

@@ -62,7 +62,7 @@ pub(crate) type OdeState = [f64; 4];
 /// # Errors
 /// [`DynamicsError::Stiff`] if `MAX_STEPS` do not suffice, [`DynamicsError::NotFinite`] if the
 /// rate is not.
-pub fn integrate(
+pub fn dormand_prince(
     start: OdeState,
     end: f64,
     scale: OdeState,

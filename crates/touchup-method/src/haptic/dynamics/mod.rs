@@ -18,7 +18,7 @@
 
 mod bounded;
 mod contact_model;
-pub mod dormand_prince;
+mod dormand_prince;
 mod error;
 mod rotation;
 mod sigmoid_flow;
@@ -30,6 +30,7 @@ use touchup_geometry::numeric::length_and_direction;
 
 pub use contact_model::{ContactModel, LARGEST_SHARE, SigmoidParams};
 use contact_model::{Hold, Shift};
+pub use dormand_prince::dormand_prince;
 pub use error::DynamicsError;
 pub use rotation::turn;
 
@@ -410,7 +411,7 @@ impl FaceDynamics {
         let start = [0.0, touch.n.x, touch.n.y, touch.n.z];
         let scale = [scale.max(f64::MIN_POSITIVE), 1.0, 1.0, 1.0];
         let [displacement, x, y, z] =
-            dormand_prince::integrate(start, touch.dt, scale, dormand_prince::RELATIVE, rate)?;
+            dormand_prince::dormand_prince(start, touch.dt, scale, dormand_prince::RELATIVE, rate)?;
         Ok((displacement, Vector3::new(x, y, z).normalize()))
     }
 }
