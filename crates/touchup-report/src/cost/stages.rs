@@ -13,7 +13,7 @@ use crate::{Spread, timed};
 use touchup_features::features::detect;
 use touchup_geometry::mesh::{FaceId, FaceTree, NearbyLeaves, RefitPlan, TriMesh};
 use touchup_io::recording::{RecordingWriter, Topics};
-use touchup_method::haptic::{DynamicsParams, FaceDynamics, FaceState, RefineError, RefineParams};
+use touchup_method::haptic::{FaceDynamics, FaceState, RefineError, RefineParams};
 use touchup_method::reconstruct::Patcher;
 use touchup_method::stylus::{
     BiasTracker, Compensator, ContactEstimator, ContactEstimatorParams, ContactGate, ContactSample,
@@ -70,20 +70,20 @@ pub(super) fn stage_costs(faces: usize, timing: Timing) -> MeasureResult<Vec<Sta
         .refine_params(WrenchFrame::Sensor)
         .ok_or(MeasureError::NothingMoves)?;
 
-    let mut stylus = StylusStages::new(&scene, &params)?;
+    let plain = Compensator::new(params.compensator)?;
     let tips: Vec<Tip> = samples
         .iter()
-        .map(|sample| stylus.plain.compensate(sample))
+        .map(|sample| plain.compensate(sample))
         .collect();
     let contacts = contacts_of(&samples, params.tip)?;
     let points: Vec<_> = samples.iter().map(touching).collect();
-    let mut surface = SurfaceStages::new(&mesh, &tree, params.dynamics)?;
     let writer = RecordingWriter::new(Cursor::new(Vec::new()), &Topics::default());
     let mut writer = writer.map_err(ReplayError::from)?;
     let mut patcher = Patcher::new(scene.patcher_params().ok_or(MeasureError::NothingMoves)?)?;
 
-    let mut cases = stylus.cases(&samples, &tips);
-    cases.extend(surface.cases(&samples, &points));
+    let mut cases = stylus_cases(&scene, &params, &plain, &samples, &tips)?;
+    let dynamics = FaceDynamics::new(params.dynamics).map_err(RefineError::from)?;
+    cases.extend(surface_cases(&mesh, &tree, dynamics, &samples, &points));
     cases.extend([
         TimedCase::each("recording (on a thread of its own)", &samples, |sample| {
             let mut written = messages(sample)
@@ -112,132 +112,85 @@ pub(super) fn stage_costs(faces: usize, timing: Timing) -> MeasureResult<Vec<Sta
 }
 
 /// Stages from messages to a moving ball.
-struct StylusStages {
-    sync: Synchroniser,
-    plain: Compensator,
-    bias: BiasTracker,
-    gate: ContactGate,
-    motion: TipMotion,
-    /// largest force of free air, N
-    free: f64,
-}
-
-impl StylusStages {
-    fn new(scene: &Scene, params: &RefineParams) -> MeasureResult<Self> {
-        let contact = scene.contact.unwrap_or_default();
-        Ok(Self {
-            sync: Synchroniser::new(scene.sync_params())?,
-            plain: Compensator::new(params.compensator)?,
-            bias: BiasTracker::new(Default::default())?,
-            gate: ContactGate::new(contact)?,
-            motion: TipMotion::new(params.sliding.unwrap_or_default(), params.tip),
-            free: contact.free,
-        })
-    }
-
-    fn cases<'a>(&'a mut self, samples: &'a [Sample], tips: &'a [Tip]) -> Vec<TimedCase<'a>> {
-        let Self {
-            sync,
-            plain,
-            bias,
-            gate,
-            motion,
-            free,
-        } = self;
-        vec![
-            TimedCase::each("sync", samples, |sample| {
-                for message in messages(sample) {
-                    sync.push(message);
-                }
-                Ok(sync.next_sample())
-            }),
-            TimedCase::each("compensation (nothing to take off)", samples, |sample| {
-                Ok(plain.compensate(black_box(sample)))
-            }),
-            TimedCase::each("bias tracking", tips, |tip| {
-                Ok(bias.compensate(tip, |rest| rest.norm() < *free))
-            }),
-            TimedCase::each("contact gate", tips, |tip| {
-                Ok(gate.update(tip.stamp_ns, &tip.force_o))
-            }),
-            TimedCase::each("sliding and friction", tips, |tip| {
-                let ball = motion.update(tip, 1e-3, 0.03);
-                Ok(motion.surface_normal(&ball, 1e-3))
-            }),
-        ]
-    }
+fn stylus_cases<'a>(
+    scene: &Scene,
+    params: &RefineParams,
+    plain: &'a Compensator,
+    samples: &'a [Sample],
+    tips: &'a [Tip],
+) -> MeasureResult<Vec<TimedCase<'a>>> {
+    let contact = scene.contact.unwrap_or_default();
+    let mut sync = Synchroniser::new(scene.sync_params())?;
+    let mut bias = BiasTracker::new(Default::default())?;
+    let mut gate = ContactGate::new(contact)?;
+    let mut motion = TipMotion::new(params.sliding.unwrap_or_default(), params.tip);
+    Ok(vec![
+        TimedCase::each("sync", samples, move |sample| {
+            for message in messages(sample) {
+                sync.push(message);
+            }
+            Ok(sync.next_sample())
+        }),
+        TimedCase::each("compensation (nothing to take off)", samples, |sample| {
+            Ok(plain.compensate(black_box(sample)))
+        }),
+        TimedCase::each("bias tracking", tips, move |tip| {
+            Ok(bias.compensate(tip, |rest| rest.norm() < contact.free))
+        }),
+        TimedCase::each("contact gate", tips, move |tip| {
+            Ok(gate.update(tip.stamp_ns, &tip.force_o))
+        }),
+        TimedCase::each("sliding and friction", tips, move |tip| {
+            let ball = motion.update(tip, 1e-3, 0.03);
+            Ok(motion.surface_normal(&ball, 1e-3))
+        }),
+    ])
 }
 
 /// Stages at the surface.
-struct SurfaceStages<'m> {
-    mesh: &'m TriMesh,
-    tree: &'m FaceTree,
-    last: Option<FaceId>,
-    nearby: NearbyLeaves,
+fn surface_cases<'a>(
+    mesh: &'a TriMesh,
+    tree: &'a FaceTree,
     dynamics: FaceDynamics,
-    moving: MovingMesh,
+    samples: &'a [Sample],
+    points: &'a [Point3<f64>],
+) -> [TimedCase<'a>; 4] {
+    let (mut last, mut nearby) = (None, NearbyLeaves::default());
+    let mut moving = MovingMesh {
+        mesh: mesh.clone(),
+        tree: tree.clone(),
+        plan: RefitPlan::default(),
+        at: None,
+    };
+    let face = FaceState {
+        b: Point3::origin(),
+        n: Vector3::z(),
+    };
+    [
+        TimedCase::each("closest face, from the root", points, |p| {
+            Ok(tree.closest(mesh, p, RADIUS))
+        }),
+        TimedCase::each("closest face, from the last one", points, move |p| {
+            let hit = match last {
+                Some(hint) => tree.closest_nearby(mesh, p, hint, RADIUS, &mut nearby),
+                None => tree.closest(mesh, p, RADIUS),
+            };
+            last = hit.map(|hit| hit.face).or(last);
+            Ok(())
+        }),
+        TimedCase::each("face dynamics", samples, move |sample| {
+            let p = Point3::new(0.0, 0.0, -0.05e-3);
+            Ok(dynamics
+                .step(black_box(&face), &p, &sample.wrench.force, 1e-3)
+                .map_err(RefineError::from)?)
+        }),
+        TimedCase::each("tree update around one face", points, move |p| {
+            Ok(moving.follow(p))
+        }),
+    ]
 }
 
-impl<'m> SurfaceStages<'m> {
-    fn new(mesh: &'m TriMesh, tree: &'m FaceTree, params: DynamicsParams) -> MeasureResult<Self> {
-        Ok(Self {
-            mesh,
-            tree,
-            last: None,
-            nearby: NearbyLeaves::default(),
-            dynamics: FaceDynamics::new(params).map_err(RefineError::from)?,
-            moving: MovingMesh {
-                mesh: mesh.clone(),
-                tree: tree.clone(),
-                plan: RefitPlan::default(),
-                at: None,
-            },
-        })
-    }
-
-    fn cases<'a>(
-        &'a mut self,
-        samples: &'a [Sample],
-        points: &'a [Point3<f64>],
-    ) -> Vec<TimedCase<'a>> {
-        let Self {
-            mesh,
-            tree,
-            last,
-            nearby,
-            dynamics,
-            moving,
-        } = self;
-        let face = FaceState {
-            b: Point3::origin(),
-            n: Vector3::z(),
-        };
-        vec![
-            TimedCase::each("closest face, from the root", points, |p| {
-                Ok(tree.closest(mesh, p, RADIUS))
-            }),
-            TimedCase::each("closest face, from the last one", points, |p| {
-                let hit = match *last {
-                    Some(hint) => tree.closest_nearby(mesh, p, hint, RADIUS, nearby),
-                    None => tree.closest(mesh, p, RADIUS),
-                };
-                *last = hit.map(|hit| hit.face).or(*last);
-                Ok(())
-            }),
-            TimedCase::each("face dynamics", samples, move |sample| {
-                let p = Point3::new(0.0, 0.0, -0.05e-3);
-                Ok(dynamics
-                    .step(black_box(&face), &p, &sample.wrench.force, 1e-3)
-                    .map_err(RefineError::from)?)
-            }),
-            TimedCase::each("tree update around one face", points, |p| {
-                Ok(moving.follow(p))
-            }),
-        ]
-    }
-}
-
-/// A separate mesh whose boxes follow it./// A separate mesh whose boxes follow it.
+/// A separate mesh whose boxes follow it./// A separate mesh whose boxes follow it./// A separate mesh whose boxes follow it.
 struct MovingMesh {
     mesh: TriMesh,
     tree: FaceTree,
