@@ -221,6 +221,73 @@ fn contact_of(mean: &Mean) -> Option<(Point3<f64>, Vector3<f64>)> {
     ))
 }
 
+/// Equation of one contact: its distance from the scan by the unknowns.
+struct ContactRow {
+    row: Unknowns,
+    /// distance along its normal, m
+    error: f64,
+    /// square of its distance from the centre, m²
+    arm_squared: f64,
+    contact: Point3<f64>,
+}
+
+impl ContactRow {
+    /// Distance after a step.
+    fn left(&self, step: &Unknowns) -> f64 {
+        self.error - self.row.dot(step)
+    }
+}
+
+/// Step by reweighted least squares, and the distance at which a contact has half of its weight.
+///
+/// - `prior`: information about the surface offset.
+/// - `unit`: information of a contact of weight 1.
+fn robust_step(
+    rows: &[ContactRow],
+    scan_noise: f64,
+    prior: f64,
+    unit: f64,
+) -> Result<(Unknowns, f64), RegistrationError> {
+    let (mut step, mut half_weight) = (Unknowns::zeros(), f64::INFINITY);
+    for _ in 0..5 {
+        let mut equations = NormalEquations::default();
+        equations.information[(6, 6)] = prior;
+        let values = rows.iter().map(|row| (row.row, row.error));
+        equations.add_reweighted(values, &step, |_, left| {
+            cauchy_weight((left / half_weight).powi(2)) * unit
+        });
+        step = equations
+            .solution()
+            .ok_or(RegistrationError::NotConverged)?;
+        half_weight = HALF_WEIGHT * scan_noise;
+    }
+    Ok((step, half_weight))
+}
+
+/// Covariance of the step, by the growth of the weighted errors instead of the weights.
+///
+/// - `scale`: variance of the errors, of that of the scan.
+fn covariance(
+    rows: &[ContactRow],
+    weights: &[f64],
+    prior: f64,
+    unit: f64,
+    scale: f64,
+) -> Result<Information, RegistrationError> {
+    let mut slopes = Information::zeros();
+    slopes[(6, 6)] = prior;
+    for (ContactRow { row, .. }, weight) in rows.iter().zip(weights) {
+        slopes += row * row.transpose() * (weight * (2.0 * weight - 1.0) * unit);
+    }
+    let inverse = slopes
+        .try_inverse()
+        .ok_or(RegistrationError::NotConverged)?;
+    let mut covariance = inverse * scale;
+    // the prior of the surface offset does not depend on the errors
+    covariance += inverse.column(6) * inverse.column(6).transpose() * (prior * (1.0 - scale));
+    Ok(covariance)
+}
+
 /// One round of least squares.
 struct RegistrationRound {
     /// t, θ, and the surface offset itself
@@ -240,7 +307,6 @@ impl RegistrationRound {
             .map_or(f64::INFINITY, |c| twist.dot(&c.solve(&twist)).sqrt())
     }
 
-    #[expect(clippy::too_many_lines)]
     fn of(
         registrar: &Registrar,
         contacts: &[(Point3<f64>, Vector3<f64>)],
@@ -263,18 +329,18 @@ impl RegistrationRound {
                 let is_same = scan.normal(hit.face).dot(&(pose.inverse() * n)) >= SMALLEST_COSINE;
                 let arm = p - centre;
                 let row = point_to_plane_row(&arm, n, 1.0).insert_row(6, -1.0);
-                is_same.then(|| {
-                    (
-                        voxel_of(p, correlation),
-                        row,
-                        n.dot(&(p - pose * hit.point)),
-                        arm.norm_squared(),
-                        *p,
-                    )
+                is_same.then(|| ContactRow {
+                    row,
+                    error: n.dot(&(p - pose * hit.point)),
+                    arm_squared: arm.norm_squared(),
+                    contact: *p,
                 })
             })
             .collect();
-        let cells: std::collections::BTreeSet<_> = rows.iter().map(|(cell, ..)| *cell).collect();
+        let cells: std::collections::BTreeSet<_> = rows
+            .iter()
+            .map(|row| voxel_of(&row.contact, correlation))
+            .collect();
         if cells.len() < LEAST_CELLS {
             return Err(RegistrationError::TooFew {
                 cells: cells.len(),
@@ -282,59 +348,29 @@ impl RegistrationRound {
             });
         }
         let count = rows.len() as f64;
-        let lever = (rows.iter().map(|(_, _, _, square, _)| square).sum::<f64>() / count).sqrt();
-        check_directions(
-            &rows.iter().map(|(_, row, ..)| *row).collect::<Vec<_>>(),
-            lever,
-        )?;
+        let lever = (rows.iter().map(|row| row.arm_squared).sum::<f64>() / count).sqrt();
+        check_directions(&rows.iter().map(|row| row.row).collect::<Vec<_>>(), lever)?;
 
         let prior = 1.0 / (surface_offset * surface_offset);
-        let unit = independent(rows.iter().map(|(_, _, _, _, p)| p), correlation)
+        let unit = independent(rows.iter().map(|row| &row.contact), correlation)
             / count
             / (scan_noise * scan_noise);
-        let (mut step, mut half_weight) = (Unknowns::zeros(), f64::INFINITY);
-        for _ in 0..5 {
-            let mut equations = NormalEquations::default();
-            equations.information[(6, 6)] = prior;
-            let values = rows.iter().map(|(_, row, error, ..)| (*row, *error));
-            equations.add_reweighted(values, &step, |_, left| {
-                cauchy_weight((left / half_weight).powi(2)) * unit
-            });
-            step = equations
-                .solution()
-                .ok_or(RegistrationError::NotConverged)?;
-            half_weight = HALF_WEIGHT * scan_noise;
-        }
-        let weight = |error: f64, row: &Unknowns| {
-            cauchy_weight(((error - row.dot(&step)) / half_weight).powi(2))
-        };
+        let (step, half_weight) = robust_step(&rows, scan_noise, prior, unit)?;
         let weights: Vec<f64> = rows
             .iter()
-            .map(|(_, row, error, ..)| weight(*error, row))
+            .map(|row| cauchy_weight((row.left(&step) / half_weight).powi(2)))
             .collect();
-        // information by the growth of the weighted errors, not by the weights
-        let mut slopes = Information::zeros();
-        slopes[(6, 6)] = prior;
-        for ((_, row, ..), weight) in rows.iter().zip(&weights) {
-            slopes += row * row.transpose() * (weight * (2.0 * weight - 1.0) * unit);
-        }
-        let inverse = slopes
-            .try_inverse()
-            .ok_or(RegistrationError::NotConverged)?;
         // no better than the stated noise of the scan: few places can agree by chance
         let square: f64 = rows
             .iter()
             .zip(&weights)
-            .map(|((_, row, error, ..), w)| w * (error - row.dot(&step)).powi(2))
+            .map(|(row, w)| w * row.left(&step).powi(2))
             .sum();
         let scale =
             (square / weights.iter().sum::<f64>() / (scan_noise * scan_noise)).max(LEAST_SCALE);
-        let mut covariance = inverse * scale;
-        // the prior of the surface offset does not depend on the errors
-        covariance += inverse.column(6) * inverse.column(6).transpose() * (prior * (1.0 - scale));
         Ok(Self {
             step,
-            covariance,
+            covariance: covariance(&rows, &weights, prior, unit, scale)?,
             lever,
             contacts: rows.len(),
         })
