@@ -1,7 +1,7 @@
 //! Patterns of speech that plain English does without, each per 1,000 lines of comments.
 
 use super::bound::{Bound, per_thousand};
-use super::source::{Source, of_program};
+use super::source::{Source, files};
 use std::sync::LazyLock;
 
 const WHAT: Bound = Bound {
@@ -124,7 +124,15 @@ fn word_and_signs(text: &str) -> impl Iterator<Item = &str> {
     parts.into_iter().filter(|part| !part.is_empty())
 }
 
-static COMMENTS: LazyLock<Comments> = LazyLock::new(|| Comments::of(of_program()));
+/// Those of the program and of all that tests and measures it.
+static COMMENTS: LazyLock<Comments> = LazyLock::new(|| {
+    let texts = files(&["src", "crates", "tests", "benches", "examples", "fuzz/src"]);
+    let sources: Vec<_> = texts
+        .iter()
+        .map(|(file, text)| Source::of(file, text))
+        .collect();
+    Comments::of(sources.iter())
+});
 
 #[test]
 fn comments_name_things_by_nouns() {
