@@ -9,7 +9,7 @@
 //! | [`features_file`], [`touches_file`], [`probed_touches_file`], [`result_table`] | measured features and touches |
 //! | [`nominal_file`], [`inspection_file`], [`qif_file`] | drawings, and inspections against them |
 //! | [`scan_folder`], [`session_folder`], [`result_folder`] | folders of scans, sessions and results |
-//! | [`urdf`], [`parameters_file`], [`json_lines`], [`text_file`], [`png`](mod@png) | an arm, ROS parameters, records, texts, pictures |
+//! | [`urdf`], [`json_lines`], [`text_file`], [`png`](mod@png) | an arm, records, texts, pictures |
 //! | [`atomic`], [`content_hash`], [`file_error`], [`machine`] | whole files, their content as a number, their errors, the machine |
 #![cfg_attr(not(test), warn(clippy::unwrap_used))]
 
@@ -59,7 +59,6 @@ pub mod json_lines;
 pub mod machine;
 pub mod mesh_file;
 pub mod nominal_file;
-pub mod parameters_file;
 pub mod png;
 pub mod probed_touches_file;
 pub mod qif_file;

@@ -13,13 +13,20 @@ const MAX_TEXT_BYTES: u64 = 64 << 20;
 /// # Errors
 /// [`FileError::Read`], also for invalid UTF-8.
 pub fn read_text(path: &Path) -> Result<String, FileError> {
-    let no_text = |error| io::Error::new(io::ErrorKind::InvalidData, error);
-    let text = read_up_to(path, MAX_TEXT_BYTES)
-        .and_then(|bytes| String::from_utf8(bytes).map_err(no_text));
-    text.map_err(|source| FileError::Read {
+    read_text_up_to(path, MAX_TEXT_BYTES).map_err(|source| FileError::Read {
         path: path.to_owned(),
         source,
     })
+}
+
+/// A text of not more than `limit` bytes.
+///
+/// # Errors
+/// Any system error; [`io::ErrorKind::InvalidData`] for invalid UTF-8,
+/// [`io::ErrorKind::FileTooLarge`] for a longer one.
+pub fn read_text_up_to(path: &Path, limit: u64) -> io::Result<String> {
+    let no_text = |error| io::Error::new(io::ErrorKind::InvalidData, error);
+    read_up_to(path, limit).and_then(|bytes| String::from_utf8(bytes).map_err(no_text))
 }
 
 /// Writes it, as a whole or not at all.

@@ -9,7 +9,7 @@ use thiserror::Error;
 
 use crate::ros::names::{GraphPlace, NameError, Remap, checked, matches};
 use crate::ros::parameters::{ParameterError, ParameterValue, Parameters};
-use touchup_io::parameters_file;
+use touchup_io::text_file::read_text_up_to;
 use touchup_session::scene::nearest;
 
 mod yaml;
@@ -357,8 +357,11 @@ fn parameter(text: &str) -> Result<Override, ArgumentError> {
     })
 }
 
+/// Maximum size of a parameter file, bytes.
+const LARGEST_FILE: u64 = 1 << 20;
+
 fn from_file(path: &Path) -> Result<Vec<Override>, ArgumentError> {
-    let text = parameters_file::read(path).map_err(|source| ArgumentError::Read {
+    let text = read_text_up_to(path, LARGEST_FILE).map_err(|source| ArgumentError::Read {
         path: path.to_owned(),
         source,
     })?;
