@@ -10,8 +10,8 @@ use serde::Serialize;
 use super::common::progress::WorkProgress;
 use super::common::recorded::RecordingFlags;
 use super::{CliError, Losses, check_kept, check_outputs, check_place, counted, print_report};
-use touchup_io::atomic::has_ending;
 use touchup_io::features_file::read_features;
+use touchup_io::file_kind::FileKind;
 use touchup_io::recording::{CopiedRecording, RecordingReader, Topics, copy_recording};
 use touchup_io::result_table::{ResultTable, is_table};
 use touchup_session::scene::Scene;
@@ -153,7 +153,7 @@ struct ConvertedTable {
 
 /// Converts features if the input is JSON, else touches.
 fn convert_results(input: &Path, out: &Path, json: bool) -> Result<Losses, CliError> {
-    let table = match has_ending(input, &["json"]) {
+    let table = match FileKind::of(input) == Some(FileKind::Json) {
         true => ResultTable::of_features(&read_features(input)?.features),
         false => ResultTable::of_touches_file(input)?,
     };

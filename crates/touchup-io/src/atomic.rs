@@ -121,14 +121,6 @@ pub fn is_same_file(a: &Path, b: &Path) -> bool {
     fs::canonicalize(a).is_ok_and(|a| fs::canonicalize(b).is_ok_and(|b| a == b))
 }
 
-/// Whether a name ends in one of `endings`, in letters of either case.
-pub fn has_ending(path: &Path, endings: &[&str]) -> bool {
-    let ending = path.extension().unwrap_or_default();
-    endings
-        .iter()
-        .any(|known| ending.eq_ignore_ascii_case(known))
-}
-
 /// Maximum length of a chain of links, as on Linux.
 const MOST_LINKS: usize = 40;
 

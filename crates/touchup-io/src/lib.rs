@@ -10,7 +10,7 @@
 //! | [`nominal_file`], [`inspection_file`], [`qif_file`] | drawings, and inspections against them |
 //! | [`scan_folder`], [`session_folder`], [`result_folder`] | folders of scans, sessions and results |
 //! | [`urdf`], [`json_lines`], [`text_file`], [`png`](mod@png) | an arm, records, texts, pictures |
-//! | [`atomic`], [`content_hash`], [`file_error`], [`machine`] | whole files, their content as a number, their errors, the machine |
+//! | [`atomic`], [`file_kind`], [`content_hash`], [`file_error`], [`machine`] | whole files, their kinds by name, their content as a number, their errors, the machine |
 #![cfg_attr(not(test), warn(clippy::unwrap_used))]
 
 /// Declares a report's struct and its constructor, a field at a time: name with unit, type, and
@@ -54,6 +54,7 @@ pub mod atomic;
 pub mod content_hash;
 pub mod features_file;
 pub mod file_error;
+pub mod file_kind;
 pub mod inspection_file;
 pub mod json_lines;
 pub mod machine;

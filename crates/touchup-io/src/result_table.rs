@@ -8,9 +8,9 @@ use std::path::Path;
 use parquet::errors::ParquetError;
 use serde_json::{Map, Value};
 
-use crate::atomic::has_ending;
 use crate::features_file::{FeatureFile, FeatureRecord, write_features};
 use crate::file_error::{FileError, write_file};
+use crate::file_kind::FileKind;
 use crate::touches_file::{self, TouchesFileError, write_touches};
 use touchup_method::stylus::ProbedPoint;
 
@@ -174,7 +174,7 @@ impl ResultTable {
     /// # Errors
     /// [`ResultTableError`]
     pub fn write(&self, path: &Path) -> Result<(), ResultTableError> {
-        Ok(if has_ending(path, &["parquet"]) {
+        Ok(if FileKind::of(path) == Some(FileKind::Parquet) {
             let bytes = self.parquet()?;
             write_file(path, |out| out.write_all(&bytes))
         } else {
@@ -195,7 +195,7 @@ impl ResultTable {
 
 /// Whether the file name's ending means a table: CSV or Parquet.
 pub fn is_table(path: &Path) -> bool {
-    has_ending(path, &["csv", "parquet"])
+    matches!(FileKind::of(path), Some(FileKind::Csv | FileKind::Parquet))
 }
 
 /// Writes features in the form of the ending, as a whole or not at all: a [table](is_table), else
@@ -219,7 +219,7 @@ pub fn write_touches_as_named(
     path: &Path,
     touches: &[ProbedPoint],
 ) -> Result<(), ResultTableError> {
-    match has_ending(path, &["parquet"]) {
+    match FileKind::of(path) == Some(FileKind::Parquet) {
         true => ResultTable::of_touches(touches).write(path),
         false => Ok(write_touches(path, touches)?),
     }

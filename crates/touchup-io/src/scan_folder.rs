@@ -9,15 +9,11 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use serde::Serialize;
 use tempfile::TempPath;
 
-use super::atomic::{has_ending, remove_left};
-use super::mesh_file::SCAN_EXTENSIONS;
+use super::atomic::remove_left;
+use super::file_kind::FileKind;
 use super::recording::{is_of_recording, own_files};
 use super::session_folder::is_plain_name;
 
-/// Single-file recordings, by extension.
-const RECORDING_EXTENSIONS: &[&str] = &["mcap", "db3"];
-/// Tables of points.
-const TABLE_EXTENSIONS: &[&str] = &["csv"];
 /// Maximum number of files in a list: the newest.
 const MOST_LISTED: usize = 500;
 /// Maximum number of files in the check for a recording folder.
@@ -41,16 +37,11 @@ pub enum FolderFileKind {
 }
 
 impl FolderFileKind {
-    fn of_name(name: &str) -> Option<Self> {
-        let is_of = |known: &[&str]| has_ending(Path::new(name), known);
-        if is_of(SCAN_EXTENSIONS) {
-            Some(Self::Scan)
-        } else if is_of(RECORDING_EXTENSIONS) {
-            Some(Self::Recording)
-        } else if is_of(TABLE_EXTENSIONS) {
-            Some(Self::PointTable)
-        } else {
-            None
+    fn of(name: &str) -> Option<Self> {
+        match FileKind::of(Path::new(name))? {
+            FileKind::Mcap | FileKind::Db3 => Some(Self::Recording),
+            FileKind::Csv => Some(Self::PointTable),
+            kind => FileKind::SCANS.contains(&kind).then_some(Self::Scan),
         }
     }
 }
@@ -74,13 +65,12 @@ pub enum ScanFolderError {
     #[error("\"{0}\" is not a plain name of a file: give one without folders, such as scan.ply")]
     NotAPlainName(String),
     /// An extension of another kind than a scan.
-    #[error("\"{0}\" is no scan by its name: it must end in one of {known}", known = SCAN_EXTENSIONS.join(", "))]
+    #[error("\"{0}\" is no scan by its name: it must end in one of {known}", known = FileKind::SCANS.map(FileKind::name).join(", "))]
     NotAScan(String),
     /// An extension of another kind than a recording or table.
     #[error(
-        "\"{0}\" is neither a recording nor a table of points by its name: it must end in one of {known}, {tables}",
-        known = RECORDING_EXTENSIONS.join(", "),
-        tables = TABLE_EXTENSIONS.join(", ")
+        "\"{0}\" is neither a recording nor a table of points by its name: it must end in one of {known}",
+        known = [FileKind::Mcap, FileKind::Db3, FileKind::Csv].map(FileKind::name).join(", ")
     )]
     NotARecording(String),
     /// A folder that is no recording, or leads out of itself.
@@ -148,7 +138,7 @@ impl ScanFolder {
             let bytes = match about.is_dir() {
                 _ if !is_plain_name(&name) => None,
                 true if kind == FolderFileKind::Recording => bag_bytes(&self.path.join(&name)),
-                _ => (about.is_file() && FolderFileKind::of_name(&name) == Some(kind))
+                _ => (about.is_file() && FolderFileKind::of(&name) == Some(kind))
                     .then_some(about.len()),
             };
             let since = |time: SystemTime| time.duration_since(UNIX_EPOCH).ok();
@@ -183,7 +173,7 @@ impl ScanFolder {
         let path = self.path.join(name);
         // a link may lead anywhere
         match fs::symlink_metadata(&path) {
-            Ok(about) if about.is_file() && FolderFileKind::of_name(name) == Some(kind) => Ok(path),
+            Ok(about) if about.is_file() && FolderFileKind::of(name) == Some(kind) => Ok(path),
             Ok(about) if about.is_dir() && kind == FolderFileKind::Recording => {
                 match own_files(&path) {
                     Some(_) => Ok(path),
@@ -267,7 +257,7 @@ fn cleaned(name: &str, is_scan: bool) -> Result<String, ScanFolderError> {
             name.chars().take(LONGEST_NAME).collect(),
         ));
     }
-    match FolderFileKind::of_name(name) {
+    match FolderFileKind::of(name) {
         Some(kind) if (kind == FolderFileKind::Scan) == is_scan => {}
         _ if is_scan => return Err(ScanFolderError::NotAScan(name.to_owned())),
         _ => return Err(ScanFolderError::NotARecording(name.to_owned())),
@@ -429,7 +419,7 @@ mod tests {
     fn every_kind_of_file_that_is_listed_is_one_that_is_read() {
         use crate::mesh_file::{MeshFileError, MeshUnit, read_mesh_or_points};
         let place = tempfile::tempdir().unwrap();
-        let is_known = |extension: &str| {
+        let is_known = |extension| {
             let path = place.path().join(format!("part.{extension}"));
             fs::write(&path, "nothing of it").unwrap();
             !matches!(
@@ -437,7 +427,12 @@ mod tests {
                 Err(MeshFileError::UnknownFormat { .. })
             )
         };
-        assert!(SCAN_EXTENSIONS.iter().all(|extension| is_known(extension)));
+        assert!(
+            FileKind::SCANS
+                .map(FileKind::name)
+                .into_iter()
+                .all(is_known)
+        );
         assert!(!is_known("md") && !is_known("yaml"));
     }
 

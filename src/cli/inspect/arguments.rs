@@ -10,7 +10,7 @@ use crate::cli::{CliError, check_outputs};
 use touchup_inspect::{
     DrawingParams, InspectionParams, InspectionSource, ReportFiles, ReportParams,
 };
-use touchup_io::atomic::has_ending;
+use touchup_io::file_kind::FileKind;
 use touchup_io::mesh_file::MeshUnit;
 
 #[derive(Debug, Args)]
@@ -64,8 +64,10 @@ impl InspectArguments {
             self.scene.as_ref(),
         ];
         check_outputs(&outputs, &inputs, "read: choose another place")?;
-        let is_xml = qif.as_ref().is_some_and(|path| has_ending(path, &["xml"]));
-        let ending = if is_xml { ".xml" } else { ".qif" };
+        let ending = match qif.as_deref().and_then(FileKind::of) {
+            Some(FileKind::Xml) => ".xml",
+            _ => ".qif",
+        };
         check_outputs(
             &[("--qif", ending, qif)],
             &inputs,

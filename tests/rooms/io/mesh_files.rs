@@ -2,8 +2,9 @@
 
 use nalgebra::{Point3, Vector3};
 use proptest::prelude::*;
-use touchup::io::mesh_file::{MeshFile, MeshFileError, MeshUnit, VertexColumn};
-use touchup::io::mesh_file::{read_appearance, read_mesh, write_mesh, write_mesh_with};
+use touchup::io::mesh_file::{MeshFile, MeshFileError, MeshOrPoints, MeshUnit, VertexColumn};
+use touchup::io::mesh_file::{read_appearance, read_mesh, read_mesh_or_points};
+use touchup::io::mesh_file::{read_vertex_columns, write_mesh, write_mesh_with};
 use touchup::mesh::{FaceId, SerialWorkers, Texture, TriMesh, VertexColours, VertexId, repair};
 
 use crate::allocations::largest_request;
@@ -417,6 +418,33 @@ fn colours_and_textures_come_back_from_either_kind_of_file() {
     check("sub/out.ply");
     let text = std::fs::read(at("sub/out.ply")).unwrap();
     assert!(String::from_utf8_lossy(&text).contains("TextureFile c.png\n"));
+}
+
+/// The content decides for each reader: the header of PCD, with one point by hand.
+#[test]
+fn points_under_the_name_of_a_mesh_have_neither_appearance_nor_columns() {
+    let folder = tempfile::tempdir().unwrap();
+    let triangle = TriMesh::new(
+        vec![
+            Point3::origin(),
+            Point3::new(1.0, 0.0, 0.0),
+            Point3::new(0.0, 1.0, 0.0),
+        ],
+        vec![[0, 1, 2]],
+    )
+    .unwrap();
+    for name in ["part.ply", "part.obj", "part.stl", "part.pcd", "part"] {
+        let path = folder.path().join(name);
+        let header = "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 1\nHEIGHT 1\n";
+        std::fs::write(&path, format!("{header}DATA ascii\n1 2 3\n")).unwrap();
+        let MeshOrPoints::Points(cloud) = read_mesh_or_points(&path, Metre).unwrap() else {
+            panic!("{name} was read as a mesh");
+        };
+        assert_eq!(cloud.positions, [Point3::new(1.0, 2.0, 3.0)], "{name}");
+        assert!(read_appearance(&path, Metre).unwrap().is_none(), "{name}");
+        let columns = read_vertex_columns(&path, Metre, &triangle, ["x"]).unwrap();
+        assert_eq!(columns, [None], "{name}");
+    }
 }
 
 #[test]

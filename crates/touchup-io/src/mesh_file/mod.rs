@@ -19,19 +19,17 @@ use nalgebra::Point3;
 use super::atomic::AtomicFile;
 pub use super::file_error::FilePlace;
 use super::file_error::{FileError, read_file, write_file};
+use super::file_kind::FileKind;
 use appearance::SoupTexture;
 pub use column::{ColumnValues, VertexColumn};
 pub use defect::Defect;
 use defect::Syntax;
-use point_cloud::CloudFormat;
+use point_cloud::{e57, pcd};
 use soup::Soup;
 use touchup_geometry::mesh::{
     Appearance, FARTHEST, MeshError, PointCloud, RepairReport, Texture, TriMesh, is_place, repair,
 };
 pub use unit::{ImplausibleSize, LARGEST_M, MeshUnit, SMALLEST_M};
-
-/// Extensions of scan files, in lower case: meshes, then point clouds.
-pub const SCAN_EXTENSIONS: &[&str] = &["ply", "stl", "obj", "pcd", "xyz", "txt", "asc", "e57"];
 
 /// Why a mesh file could not be read or written.
 #[derive(Debug, thiserror::Error)]
@@ -106,32 +104,23 @@ pub struct MeshFile {
     pub repair: RepairReport,
 }
 
-#[derive(Clone, Copy)]
-enum Format {
-    Ply,
-    Stl,
-    Obj,
+/// Kind of a file by unambiguous content, else by its name.
+fn kind_of(bytes: &[u8], path: &Path) -> Option<FileKind> {
+    match bytes {
+        [b'p', b'l', b'y', b'\r' | b'\n', ..] => Some(FileKind::Ply),
+        _ if stl::is_binary(bytes) || stl::looks_ascii(bytes) => Some(FileKind::Stl),
+        _ if e57::is_e57(bytes) => Some(FileKind::E57),
+        _ if pcd::is_pcd(bytes) => Some(FileKind::Pcd),
+        _ => FileKind::of(path),
+    }
 }
 
-impl Format {
-    fn of_name(path: &Path) -> Result<Self, MeshFileError> {
-        let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
-        match extension.to_str() {
-            Some("ply") => Ok(Self::Ply),
-            Some("stl") => Ok(Self::Stl),
-            Some("obj") => Ok(Self::Obj),
-            _ => Err(MeshFileError::UnknownFormat { path: path.into() }),
-        }
-    }
-
-    /// Format by unambiguous content.
-    fn of_content(bytes: &[u8]) -> Option<Self> {
-        match bytes {
-            [b'p', b'l', b'y', b'\r' | b'\n', ..] => Some(Self::Ply),
-            _ if stl::is_binary(bytes) || stl::looks_ascii(bytes) => Some(Self::Stl),
-            _ => None,
-        }
-    }
+/// Kind of a mesh to write.
+fn mesh_kind(path: &Path) -> Result<FileKind, MeshFileError> {
+    let unknown = || MeshFileError::UnknownFormat { path: path.into() };
+    FileKind::of(path)
+        .filter(|kind| FileKind::MESHES.contains(kind))
+        .ok_or_else(unknown)
 }
 
 /// Content of a scan file.
@@ -178,34 +167,30 @@ pub fn read_mesh_or_points(path: &Path, unit: MeshUnit) -> Result<MeshOrPoints, 
     if bytes.is_empty() {
         return Err(syntax(Syntax::ends(FilePlace::Byte(0), "a mesh")));
     }
-    match cloud_format(&bytes, path) {
-        Some(CloudFormat::E57) if unit != MeshUnit::Metre => {
+    let points = |read: Result<_, _>| read.map(MeshOrPoints::Points).map_err(syntax);
+    let scale = unit.metres();
+    let soup = match kind_of(&bytes, path) {
+        Some(FileKind::Stl) => stl::read(&bytes, scale),
+        Some(FileKind::Obj) => obj::read(&bytes, scale),
+        Some(FileKind::Ply) => match ply::read(&bytes, scale) {
+            Ok(soup) if soup.faces.is_empty() && !soup.positions.is_empty() => {
+                let columns = ply::read_columns(&bytes, scale, ["nx", "ny", "nz"]);
+                return points(columns.map(|(at, normals)| point_cloud::of_ply(at, normals)));
+            }
+            soup => soup,
+        },
+        Some(FileKind::Pcd) => return points(pcd::read(&bytes, scale)),
+        Some(FileKind::Xyz | FileKind::Txt | FileKind::Asc) => {
+            return points(point_cloud::text::read(&bytes, scale));
+        }
+        Some(FileKind::E57) if unit == MeshUnit::Metre => return points(e57::read(&bytes, scale)),
+        Some(FileKind::E57) => {
             return Err(MeshFileError::UnitOfE57 {
                 path: path.into(),
                 unit,
             });
         }
-        Some(format) => {
-            return Ok(MeshOrPoints::Points(
-                format.read(&bytes, unit).map_err(syntax)?,
-            ));
-        }
-        None => {}
-    }
-    let scale = unit.metres();
-    let soup = match Format::of_content(&bytes).map_or_else(|| Format::of_name(path), Ok)? {
-        Format::Stl => stl::read(&bytes, scale),
-        Format::Obj => obj::read(&bytes, scale),
-        Format::Ply => match ply::read(&bytes, scale) {
-            Ok(soup) if soup.faces.is_empty() && !soup.positions.is_empty() => {
-                let columns = ply::read_columns(&bytes, scale, ["nx", "ny", "nz"]);
-                let (positions, normals) = columns.map_err(syntax)?;
-                return Ok(MeshOrPoints::Points(point_cloud::of_ply(
-                    positions, normals,
-                )));
-            }
-            soup => soup,
-        },
+        _ => return Err(MeshFileError::UnknownFormat { path: path.into() }),
     };
     let Soup {
         positions,
@@ -237,10 +222,10 @@ pub fn read_appearance(path: &Path, unit: MeshUnit) -> Result<Option<Appearance>
     }
     let bytes = read_file(path)?;
     let folder = path.parent().unwrap_or(Path::new(""));
-    let soup = match Format::of_content(&bytes).map_or_else(|| Format::of_name(path), Ok) {
-        Ok(Format::Ply) => ply::painted::read_painted(&bytes, unit.metres()),
-        Ok(Format::Obj) => obj::read_painted(&bytes, unit.metres(), folder),
-        Ok(Format::Stl) | Err(_) => return Ok(None),
+    let soup = match kind_of(&bytes, path) {
+        Some(FileKind::Ply) => ply::painted::read_painted(&bytes, unit.metres()),
+        Some(FileKind::Obj) => obj::read_painted(&bytes, unit.metres(), folder),
+        _ => return Ok(None),
     };
     let soup = soup.map_err(|Syntax { place, defect }| MeshFileError::Syntax {
         path: path.into(),
@@ -282,15 +267,6 @@ pub fn repaired(
     Ok(MeshFile { mesh, repair })
 }
 
-/// The format of a file of points alone.
-fn cloud_format(bytes: &[u8], path: &Path) -> Option<CloudFormat> {
-    let of_name = || CloudFormat::of_extension(path.extension()?.to_ascii_lowercase().to_str()?);
-    match Format::of_content(bytes) {
-        Some(_) => None,
-        None => CloudFormat::of_content(bytes).or_else(of_name),
-    }
-}
-
 /// The available scalar properties `names` of the vertices of a PLY file, for each vertex of the
 /// `mesh` that [`read_mesh`] makes of it; none for other kinds of files.
 ///
@@ -306,7 +282,7 @@ pub fn read_vertex_columns<const N: usize>(
     names: [&str; N],
 ) -> Result<[Option<Vec<f32>>; N], MeshFileError> {
     let bytes = read_file(path)?;
-    if !matches!(Format::of_content(&bytes), Some(Format::Ply)) {
+    if kind_of(&bytes, path) != Some(FileKind::Ply) {
         return Ok([const { None }; N]);
     }
     let syntax = |Syntax { place, defect }| MeshFileError::Syntax {
@@ -338,7 +314,7 @@ fn rows_of(mesh: &TriMesh, positions: &[Point3<f64>]) -> Vec<usize> {
 /// # Errors
 /// As [`write_mesh`].
 pub fn check_target(path: &Path) -> Result<(), MeshFileError> {
-    Format::of_name(path)?;
+    mesh_kind(path)?;
     Ok(AtomicFile::create(path)
         .map(drop)
         .map_err(|source| FileError::Write {
@@ -375,7 +351,7 @@ pub fn write_mesh_with(
     texture: Option<&Texture>,
     unit: MeshUnit,
 ) -> Result<(), MeshFileError> {
-    let format = Format::of_name(path)?;
+    let kind = mesh_kind(path)?;
     if let Some(vertex) = mesh.positions().iter().position(|p| !is_place(p)) {
         return Err(MeshFileError::NoPlace {
             path: path.into(),
@@ -387,13 +363,13 @@ pub fn write_mesh_with(
         .map(|texture| SoupTexture::of(texture, mesh, path.parent().unwrap_or(Path::new(""))));
     let (texture, materials) = (texture.as_ref(), path.with_extension("mtl"));
     let images = texture.map_or(&[][..], |texture| &texture.images);
-    if matches!(format, Format::Obj) && !images.is_empty() {
+    if kind == FileKind::Obj && !images.is_empty() {
         write_file(&materials, |out| obj::write_materials(images, out))?;
     }
     let materials = materials.file_name().unwrap_or_default().to_string_lossy();
-    Ok(write_file(path, |out| match format {
-        Format::Ply => ply::write(&soup, &ids, columns, texture, &unit, out),
-        Format::Stl => stl::write(&soup, &unit, out),
-        Format::Obj => obj::write(&soup, &ids, columns, texture, [&unit, &materials], out),
+    Ok(write_file(path, |out| match kind {
+        FileKind::Stl => stl::write(&soup, &unit, out),
+        FileKind::Obj => obj::write(&soup, &ids, columns, texture, [&unit, &materials], out),
+        _ => ply::write(&soup, &ids, columns, texture, &unit, out),
     })?)
 }

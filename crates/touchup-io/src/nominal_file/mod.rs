@@ -9,14 +9,14 @@ mod rows;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use crate::atomic::has_ending;
+use crate::file_kind::FileKind;
 
 pub use error::NominalFileError;
 pub use record::{DatumRecord, NominalRecord, NominalTolerance};
 
 /// Whether a file holds nominal values; else it is a mesh.
 pub fn is_nominal_file(path: &Path) -> bool {
-    has_ending(path, &["csv", "json"])
+    matches!(FileKind::of(path), Some(FileKind::Csv | FileKind::Json))
 }
 
 /// Reads nominal values: `.json`, else a table.
@@ -24,7 +24,7 @@ pub fn is_nominal_file(path: &Path) -> bool {
 /// # Errors
 /// [`NominalFileError`]: the first fault, with its line.
 pub fn read_nominal(path: &Path) -> Result<Vec<NominalRecord>, NominalFileError> {
-    let placed = if has_ending(path, &["json"]) {
+    let placed = if FileKind::of(path) == Some(FileKind::Json) {
         json::read(path)?
     } else {
         rows::read(path)?
@@ -78,7 +78,7 @@ pub fn write_nominal(
     records: &[NominalRecord],
     comment: &[&str],
 ) -> Result<(), NominalFileError> {
-    let written = if has_ending(path, &["json"]) {
+    let written = if FileKind::of(path) == Some(FileKind::Json) {
         json::write(path, records)
     } else {
         rows::write(path, records, comment)

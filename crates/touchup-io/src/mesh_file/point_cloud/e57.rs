@@ -10,13 +10,13 @@ use crate::file_error::FilePlace;
 use touchup_geometry::mesh::{PointCloud, ScanStation};
 
 /// Whether the file begins like E57.
-pub(super) fn is_e57(bytes: &[u8]) -> bool {
+pub(in crate::mesh_file) fn is_e57(bytes: &[u8]) -> bool {
     bytes.starts_with(b"ASTM-E57")
 }
 
 /// Reads the points of all scans in the frame of the file, each scan by its pose, with coordinates
 /// times `scale`. Invalid points come out as NaN.
-pub(super) fn read(bytes: &[u8], scale: f64) -> Result<PointCloud, Syntax> {
+pub(in crate::mesh_file) fn read(bytes: &[u8], scale: f64) -> Result<PointCloud, Syntax> {
     let foreign = |offset: u64| {
         move |why: e57::Error| Syntax {
             place: FilePlace::Byte(offset),

@@ -1,53 +1,13 @@
 //! Point clouds: PLY without faces, PCD, text and E57 in.
 
-mod e57;
+pub(super) mod e57;
 mod lzf;
-mod pcd;
-mod text;
+pub(super) mod pcd;
+pub(super) mod text;
 
 use nalgebra::{Point3, Vector3};
 
-use super::defect::Syntax;
-use super::unit::MeshUnit;
 use touchup_geometry::mesh::{PointCloud, ScanStation};
-
-/// Kinds of files of points alone.
-#[derive(Clone, Copy)]
-pub(super) enum CloudFormat {
-    Pcd,
-    Text,
-    E57,
-}
-
-impl CloudFormat {
-    /// From an extension in lower case.
-    pub fn of_extension(extension: &str) -> Option<Self> {
-        match extension {
-            "pcd" => Some(Self::Pcd),
-            "xyz" | "txt" | "asc" => Some(Self::Text),
-            "e57" => Some(Self::E57),
-            _ => None,
-        }
-    }
-
-    /// Format by unambiguous content.
-    pub fn of_content(bytes: &[u8]) -> Option<Self> {
-        match bytes {
-            _ if e57::is_e57(bytes) => Some(Self::E57),
-            _ if pcd::is_pcd(bytes) => Some(Self::Pcd),
-            _ => None,
-        }
-    }
-
-    /// Coordinates come out multiplied by the unit.
-    pub fn read(self, bytes: &[u8], unit: MeshUnit) -> Result<PointCloud, Syntax> {
-        match self {
-            Self::Pcd => pcd::read(bytes, unit.metres()),
-            Self::Text => text::read(bytes, unit.metres()),
-            Self::E57 => e57::read(bytes, unit.metres()),
-        }
-    }
-}
 
 /// The points of a PLY file.
 ///

@@ -66,13 +66,13 @@ struct PcdHeader {
 }
 
 /// Whether the text begins like PCD.
-pub(super) fn is_pcd(bytes: &[u8]) -> bool {
+pub(in crate::mesh_file) fn is_pcd(bytes: &[u8]) -> bool {
     let starts = |word: &[u8]| bytes.starts_with(word);
     starts(b"# .PCD") || starts(b"VERSION ") || starts(b"FIELDS ")
 }
 
 /// Reads positions and normals; coordinates are multiplied by `scale`.
-pub(super) fn read(bytes: &[u8], scale: f64) -> Result<PointCloud, Syntax> {
+pub(in crate::mesh_file) fn read(bytes: &[u8], scale: f64) -> Result<PointCloud, Syntax> {
     let header = PcdHeader::read(bytes)?;
     let columns = header.columns()?;
     let body = &bytes[header.len..];

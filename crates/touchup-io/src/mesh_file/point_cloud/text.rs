@@ -17,7 +17,7 @@ const UNIT_LENGTH: std::ops::RangeInclusive<f64> = 0.98..=1.02;
 /// the first decimal sign holds for all ([`Notation`]). Skips lines that begin with `#`, `//` or a
 /// letter, and a number of points in the first line. Columns 4 to 6, or the last three, are the
 /// normals if their length is 1 in every line.
-pub(super) fn read(bytes: &[u8], scale: f64) -> Result<PointCloud, Syntax> {
+pub(in crate::mesh_file) fn read(bytes: &[u8], scale: f64) -> Result<PointCloud, Syntax> {
     let end_of_line = if bytes.contains(&b'\n') { b'\n' } else { b'\r' };
     let mut lines = NumberedLines::new(
         bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes),

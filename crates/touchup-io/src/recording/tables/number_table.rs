@@ -10,16 +10,13 @@ use std::path::{Path, PathBuf};
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
 
 use super::columns::{FoundColumns, OrientationColumns, ScaledColumn, TableColumns, WrenchAxes};
-use crate::atomic::has_ending;
+use crate::file_kind::FileKind;
 use crate::recording::FilePlace;
 use crate::recording::error::BadMessage;
 use crate::recording::error::Damage;
 use crate::recording::error::RecordingError;
 use crate::tables::table_rows::{DecimalSign, MAX_ROW_BYTES, RowError, TableRows};
 use touchup_method::stylus::{StampedPose, StampedWrench, Wrench, measured_rotation};
-
-/// Endings of the names of tables.
-const ENDINGS: [&str; 4] = ["csv", "tsv", "txt", "log"];
 
 /// Number of first lines that must contain a usable one; unusable lines after them are only
 /// counted.
@@ -41,7 +38,8 @@ pub(in crate::recording) struct TableRow {
 
 /// Whether a file is a table by its name.
 pub(in crate::recording) fn is_table(path: &Path) -> bool {
-    path.is_file() && has_ending(path, &ENDINGS)
+    use FileKind::{Csv, Log, Tsv, Txt};
+    path.is_file() && matches!(FileKind::of(path), Some(Csv | Tsv | Txt | Log))
 }
 
 impl NumberTable {

@@ -8,7 +8,7 @@ use serde::de::{MapAccess, Visitor};
 use serde::{Deserialize, Deserializer};
 
 use touchup_inspect::InspectionParams;
-use touchup_io::atomic::has_ending;
+use touchup_io::file_kind::FileKind;
 use touchup_io::mesh_file::MeshUnit;
 use touchup_io::nominal_file::is_nominal_file;
 use touchup_io::session_folder::SessionFolder;
@@ -93,10 +93,10 @@ impl ReportRequest {
     /// In words: an unsupported file type.
     pub fn upload(&self) -> Result<(&str, u64), String> {
         let name = Path::new(&self.file);
-        match is_nominal_file(name) {
-            true => Ok((&self.file, LARGEST_TABLE)),
-            false if has_ending(name, &["ply", "stl", "obj"]) => Ok((&self.file, LARGEST_MESH)),
-            false => Err(format!(
+        match FileKind::of(name) {
+            _ if is_nominal_file(name) => Ok((&self.file, LARGEST_TABLE)),
+            Some(kind) if FileKind::MESHES.contains(&kind) => Ok((&self.file, LARGEST_MESH)),
+            _ => Err(format!(
                 "\"{}\": hand in nominal values as .csv or .json, or a CAD mesh as .ply, .stl or .obj",
                 self.file
             )),

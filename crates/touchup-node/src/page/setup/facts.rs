@@ -5,7 +5,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use touchup_geometry::mesh::RepairReport;
-use touchup_io::atomic::has_ending;
+use touchup_io::file_kind::FileKind;
 use touchup_io::mesh_file::{LARGEST_M, MeshFileError, MeshUnit, SMALLEST_M};
 use touchup_session::scan::{Scan, ScanError, read_scan};
 
@@ -63,7 +63,11 @@ pub(super) fn read_facts(
         faces: mesh.face_count(),
         is_of_points: cloud.is_some(),
         repair,
-        units: choices(sides.into(), stated, has_ending(path, &["e57"])),
+        units: choices(
+            sides.into(),
+            stated,
+            FileKind::of(path) == Some(FileKind::E57),
+        ),
     })
 }
 
