@@ -36,7 +36,7 @@ use touchup_method::haptic::{CarveParams, GuardParams};
 use touchup_method::parameters;
 use touchup_method::reconstruct::{PatchParams, UncertaintyParams};
 use touchup_method::stylus::{
-    BiasParams, ContactGateParams, SlidingParams, SyncParams, TipBody, TipShape,
+    BiasParams, ContactGateParams, SlidingParams, SyncParams, TipBody, TipParams, TipShape,
 };
 
 parameters! {
@@ -208,72 +208,57 @@ impl Scene {
         self.check_complete()?;
         let (shape, radius) = (self.tip_shape(), self.tip_params().radius);
         TipBody::new(shape, radius)?;
-        for (is_missing, needs) in [
-            (
-                radius <= 0.0 && !matches!(shape, TipShape::Cone { .. }),
-                "tip.radius_mm above 0",
-            ),
-            (self.contact.is_none(), "contact"),
-        ] {
-            if self.has_patch() && is_missing {
-                return Err(SceneError::Unmet {
-                    part: "patch",
-                    needs,
-                });
-            }
-        }
-        Ok(())
+        let has_extent = radius > 0.0 || matches!(shape, TipShape::Cone { .. });
+        let needs = match &self.contact {
+            _ if !self.has_patch() => return Ok(()),
+            _ if !has_extent => "tip.radius_mm above 0",
+            None => "contact",
+            Some(_) => return Ok(()),
+        };
+        Err(SceneError::Unmet {
+            part: "patch",
+            needs,
+        })
     }
 
     /// Checks the keys that need others.
     fn check_complete(&self) -> Result<(), SceneError> {
-        let (shape, radius) = (self.tip_shape(), self.tip_params().radius);
-        let half_angle = self.tip.as_ref().and_then(|tip| tip.sizes.half_angle);
-        let corners = self
-            .scan
-            .as_ref()
-            .map(|scan| (scan.region_low.is_some(), scan.region_high.is_some()));
-        let asks_for_spring = self
-            .refine
-            .as_ref()
-            .is_some_and(|it| it.contact_model == Some(ModelName::Spring));
-        for (is_missing, key, needs) in [
-            (
-                matches!(shape, TipShape::Cone { .. }) && half_angle.is_none(),
+        let require = |is_met, key, needs| match is_met {
+            true => Ok(()),
+            false => Err(SceneError::Incomplete { key, needs }),
+        };
+        if let Some(tip) = &self.tip {
+            let is_cone = tip.shape == ShapeName::Cone;
+            let has_angle = tip.sizes.half_angle.is_some();
+            require(
+                !is_cone || has_angle,
                 "tip.shape: cone",
                 "tip.half_angle_deg",
-            ),
-            (
-                corners == Some((true, false)),
-                "scan.region_low_mm",
-                "scan.region_high_mm",
-            ),
-            (
-                corners == Some((false, true)),
-                "scan.region_high_mm",
-                "scan.region_low_mm",
-            ),
-            (
-                asks_for_spring && self.tip_params().stiffness.is_none(),
+            )?;
+        }
+        if let Some(scan) = &self.scan {
+            let [low, high] = [&scan.region_low, &scan.region_high].map(Option::is_some);
+            require(high || !low, "scan.region_low_mm", "scan.region_high_mm")?;
+            require(low || !high, "scan.region_high_mm", "scan.region_low_mm")?;
+        }
+        let TipParams { radius, stiffness } = self.tip_params();
+        if let Some(refine) = &self.refine {
+            let is_met = refine.contact_model != Some(ModelName::Spring) || stiffness.is_some();
+            require(
+                is_met,
                 "refine.contact_model: spring",
                 "tip.stiffness_n_per_mm",
-            ),
-            (
-                self.robot.is_some() && (radius <= 0.0 || shape != TipShape::Ball),
+            )?;
+        }
+        if let Some(robot) = &self.robot {
+            let is_ball = radius > 0.0 && self.tip_shape() == TipShape::Ball;
+            require(
+                is_ball,
                 "robot",
                 "tip.shape: ball and tip.radius_mm above 0",
-            ),
-            (
-                self.robot
-                    .as_ref()
-                    .is_some_and(|robot| robot.model == ArmModel::Urdf && robot.urdf.is_none()),
-                "robot.model: urdf",
-                "robot.urdf",
-            ),
-        ] {
-            if is_missing {
-                return Err(SceneError::Incomplete { key, needs });
-            }
+            )?;
+            let has_arm = robot.model != ArmModel::Urdf || robot.urdf.is_some();
+            require(has_arm, "robot.model: urdf", "robot.urdf")?;
         }
         Ok(())
     }
