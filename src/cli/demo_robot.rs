@@ -291,9 +291,9 @@ fn numbers(found: Option<&Feature>, truth: &TruthFeature) -> Vec<NumberError> {
         return Vec::new();
     };
     let number = |(quantity, size): (InspectedQuantity, f64)| {
-        let measured = found.sizes().find(|(own, _)| *own == quantity);
-        let value = measured.map_or(f64::NAN, |(_, measured)| measured.value);
-        let std = measured.and_then(|(_, measured)| measured.std);
+        let measured = found.size(quantity);
+        let value = measured.map_or(f64::NAN, |measured| measured.value);
+        let std = measured.and_then(|measured| measured.std);
         let (true_mm, found_mm) = (Some(size * 1e3), Some(value * 1e3));
         NumberError {
             number: quantity.parts().0,

@@ -124,11 +124,8 @@ fn with_std(
     std: &BTreeMap<String, f64>,
     quantity: InspectedQuantity,
 ) -> Option<MeasuredNumber> {
-    Some(MeasuredNumber {
-        value: value?,
-        std: std.get(quantity.name()).copied(),
-        is_at_least: false,
-    })
+    let std = std.get(quantity.name()).copied();
+    Some(MeasuredNumber::new(value?, std))
 }
 
 impl FormRecord {
@@ -274,8 +271,7 @@ fn known(feature: &Feature) -> impl Iterator<Item = KnownNumber<'_>> {
 
 /// A size, mm or degrees.
 fn size(feature: &Feature, quantity: InspectedQuantity) -> Option<f64> {
-    let (_, size) = feature.sizes().find(|(own, _)| *own == quantity)?;
-    Some(quantity.from_si(size.value))
+    Some(quantity.from_si(feature.size(quantity)?.value))
 }
 
 impl FeatureRecord {

@@ -56,6 +56,17 @@ pub struct MeasuredNumber {
     pub is_at_least: bool,
 }
 
+impl MeasuredNumber {
+    /// A value other than a bound.
+    pub fn new(value: f64, std: Option<f64>) -> Self {
+        Self {
+            value,
+            std,
+            is_at_least: false,
+        }
+    }
+}
+
 /// Settings of decisions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DecisionParams {
@@ -270,11 +281,7 @@ mod tests {
     }
 
     fn with_std(value: f64, std: f64) -> MeasuredNumber {
-        MeasuredNumber {
-            value,
-            std: Some(std),
-            is_at_least: false,
-        }
+        MeasuredNumber::new(value, Some(std))
     }
 
     fn decided(measured: &MeasuredNumber, limits: ToleranceLimits) -> Decision {

@@ -16,8 +16,7 @@ pub fn measured_number(
     nominal: Option<&Point3<f64>>,
 ) -> Option<MeasuredNumber> {
     if quantity.is_linear_size() {
-        let (_, size) = feature.sizes().find(|(own, _)| *own == quantity)?;
-        return Some(MeasuredNumber {
+        return feature.size(quantity).map(|size| MeasuredNumber {
             value: size.value,
             std: size.std,
             is_at_least: size.is_at_least,
@@ -49,13 +48,7 @@ mod tests {
             ..Feature::default()
         };
         let of = |quantity| measured_number(&hole, quantity, Some(&Point3::origin()));
-        let with = |value, std| {
-            Some(MeasuredNumber {
-                value,
-                std,
-                is_at_least: false,
-            })
-        };
+        let with = |value, std| Some(MeasuredNumber::new(value, std));
         assert_eq!(of(InspectedQuantity::Diameter), with(8.0, Some(0.1)));
         assert_eq!(of(InspectedQuantity::Y), with(4.0, Some(0.2 / 2f64.sqrt())));
         assert_eq!(of(InspectedQuantity::Z), with(9.0, None));

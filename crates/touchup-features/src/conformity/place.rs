@@ -29,14 +29,9 @@ pub fn place_number(
         }
         _ => return None,
     };
-    let direction = Vector3::ith(at, 1.0);
-    Some(MeasuredNumber {
-        value: centre.value[at],
-        std: centre
-            .std
-            .and_then(|std| coordinate_std(kind, axis, std, &direction)),
-        is_at_least: false,
-    })
+    let along = |std| coordinate_std(kind, axis, std, &Vector3::ith(at, 1.0));
+    let std = centre.std.and_then(along);
+    Some(MeasuredNumber::new(centre.value[at], std))
 }
 
 /// Standard uncertainty of the coordinate of a centre along a direction.
@@ -82,11 +77,7 @@ fn position(
     }
     let distance = off.cross(&axis?).norm();
     let std = std.map(|std| 2.0 * std / 2f64.sqrt());
-    Some(MeasuredNumber {
-        value: 2.0 * distance,
-        std,
-        is_at_least: false,
-    })
+    Some(MeasuredNumber::new(2.0 * distance, std))
 }
 
 #[cfg(test)]

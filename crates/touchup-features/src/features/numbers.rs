@@ -21,6 +21,12 @@ impl Feature {
             .filter_map(|(quantity, size)| Some((quantity, size.as_ref()?)))
     }
 
+    /// A size, if known.
+    pub fn size(&self, quantity: InspectedQuantity) -> Option<&MeasuredValue<f64>> {
+        let (_, size) = self.sizes().find(|(own, _)| *own == quantity)?;
+        Some(size)
+    }
+
     /// Diameter or width.
     pub fn main_size(&self) -> Option<&MeasuredValue<f64>> {
         self.diameter.as_ref().or(self.width.as_ref())

@@ -166,10 +166,9 @@ fn relations(input: &ReportInput<'_>, k: f64) -> Vec<Markup> {
         }
     };
     let row = |relation: &RelationRecord| {
-        let numbers = InspectedQuantity::ALL.into_iter().filter_map(|quantity| {
-            let number = relation
-                .number(quantity)
-                .filter(|_| quantity.needs_datum())?;
+        let known = relation.numbers.keys().filter(|known| known.needs_datum());
+        let numbers = known.filter_map(|&quantity| {
+            let number = relation.number(quantity)?;
             let unit = if quantity.unit() == "deg" {
                 "°"
             } else {

@@ -134,11 +134,7 @@ fn decided(
         let parts = std.zip(of_touches);
         shared = parts.map_or(0.0, |(std, own)| (std * std - own * own).max(0.0).sqrt());
         let is_open_at = |value: f64| {
-            let number = MeasuredNumber {
-                value,
-                std: Some(shared),
-                is_at_least: false,
-            };
+            let number = MeasuredNumber::new(value, Some(shared));
             judged(&number).decision == Decision::Undecided
         };
         let stays_open = |own: f64| {
@@ -222,11 +218,7 @@ mod tests {
             limits,
             nominal: None,
         };
-        let measured = MeasuredNumber {
-            value,
-            std: Some(own.hypot(shared)),
-            is_at_least: false,
-        };
+        let measured = MeasuredNumber::new(value, Some(own.hypot(shared)));
         decided(
             &sought,
             Some(measured),

@@ -150,7 +150,7 @@ fn of_walls(feature: &Feature, truth: &TruthFeature) -> Option<Vec<(CoverageKind
         _ => K::BossPosition,
     };
     let number = |(quantity, size): (InspectedQuantity, f64)| {
-        let (_, found) = feature.sizes().find(|(own, _)| *own == quantity)?;
+        let found = feature.size(quantity)?;
         let kind = match (feature.kind, quantity) {
             (FeatureKind::Hole, InspectedQuantity::Diameter) => K::HoleDiameter,
             (FeatureKind::Hole, _) => K::HoleDepth,
