@@ -48,7 +48,9 @@ pub(super) fn init(arguments: &InitArguments) -> Result<Losses, CliError> {
     )?;
     check_place(out)?;
     let mut settings = told.settings();
-    settings.extend(scan.as_ref().map(|file| Setting::file("scan.file", file)));
+    if let Some(file) = scan {
+        settings.push(Setting::file("scan.file", file)?);
+    }
     settings.push(Setting::word("scan.unit", mesh_unit));
 
     let mut scene = Scene::default();

@@ -1,4 +1,4 @@
-"""`touchup node` with an arm, over CycloneDDS: service and action probe flagged features, cancel, and publish them.
+"""Probing by `touchup node` with an arm, over CycloneDDS: by the service and by the action, cancelling, and markers.
 
 Once with the simulated arm, once with the real ur-rtde against the stand-in for a controller. The drawing of the plate gives the expected
 endings.

@@ -290,7 +290,7 @@ def test_pages_have_the_nodes_mesh_however_late_they_join_and_one_that_takes_not
         sigmas = numpy.sqrt([early.variance[vertex] for vertex in touched]) * 1e3
         ratio = sigmas / numpy.array(list(sigma_of.values()))[at]
         assert far.max() < 1e-3 and len(touched) > 1000 and numpy.abs(ratio - 1).max() < 1e-3
-        # deviations equal libigl's from the unchanged part
+        # deviations equal libigl's from the true part
         truth = trimesh.load(demo_folder / "truth.ply", process=False)
         measured = {vertex: far for vertex, far in early.numbers_of[DEVIATION].items() if vertex in early.vertices}
         assert measured.keys() == early.vertices.keys()

@@ -710,7 +710,7 @@ fn settings_are_set_by_key_in_its_unit() {
     let settings = [
         Setting::number("tip.stiffness_n_per_mm", 12.5),
         Setting::number("uncertainty.radius_sigma_mm", 0.25),
-        Setting::file("scan.file", std::path::Path::new("it's.ply")),
+        Setting::file("scan.file", std::path::Path::new("it's.ply")).unwrap(),
         Setting::word("scan.unit", "inch"),
         Setting::list("robot.tip_position_mm", &[1.0, -2.0, 0.5]),
         Setting::word("refine.step", "dp5"),
@@ -734,6 +734,10 @@ fn settings_are_set_by_key_in_its_unit() {
         Some(StepRule::DormandPrince)
     );
 
+    for unwritable in ["two\nlines.ply", "bell\u{7}.ply"] {
+        let error = Setting::file("scan.file", std::path::Path::new(unwritable)).unwrap_err();
+        assert!(matches!(error, SceneError::CannotEdit { .. }), "{error}");
+    }
     let mut told = Scene::from_yaml("tip: { radius_mm: 2 }").unwrap();
     told.set(&[Setting::number("tip.radius_mm", 3.0)]).unwrap();
     assert_eq!(told.tip_params().radius, 3e-3);
@@ -742,6 +746,7 @@ fn settings_are_set_by_key_in_its_unit() {
         Setting::number("tip.radius", 1.0),
         Setting::number("tip", 1.0),
         Setting::number("tip.radius_mm.of", 1.0),
+        Setting::number("tip.stiffness_n_per_mm.of", 1.0),
         Setting::word("tip.radius_mm", "wide"),
     ] {
         let error = Scene::default().set(&[wrong]).unwrap_err();

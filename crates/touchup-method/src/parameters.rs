@@ -422,11 +422,14 @@ impl<T: Value> Value for Option<T> {
         if self.is_none() {
             *self = T::named();
         }
-        if let Some(value) = self {
-            return value.set(path, written, unit);
+        match (self, path.first()) {
+            (Some(value), _) => value.set(path, written, unit),
+            (None, Some(key)) => Err(D::Error::unknown_field(key, &[])),
+            (empty, None) => {
+                *empty = Some(T::of(T::Written::deserialize(written)?, unit));
+                Ok(())
+            }
         }
-        *self = Some(T::of(T::Written::deserialize(written)?, unit));
-        Ok(())
     }
 
     fn yaml(&self, unit: Unit) -> Option<String> {

@@ -36,7 +36,7 @@ pub struct Constant {
     pub value: String,
     /// of its own; empty if it has none
     pub comment: String,
-    /// index of the field below it, which has this value
+    /// index of the field below it, of which this is a value
     pub of: usize,
 }
 
@@ -49,7 +49,7 @@ pub struct Field {
     pub length: Length,
     /// in snake_case
     pub name: String,
-    /// of a parameter without another value
+    /// default value in the definition; `None` without one
     pub default: Option<String>,
     /// with the largest length, if there is one
     pub comment: String,

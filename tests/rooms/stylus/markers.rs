@@ -238,10 +238,12 @@ fn few_markers_are_coasted_over_and_then_there_is_no_pose() {
     // a frame counts when the next one has come
     let state_at = |ms: usize| {
         let [before, now] = [counts[ms / 5], counts[ms / 5 + 1]];
-        match (now.held - before.held, now.coasting - before.coasting) {
-            (1, 0) => "held",
-            (0, 1) => "coasting",
-            _ => "lost",
+        let held = now.held - before.held;
+        match (held, now.coasting - before.coasting, now.lost - before.lost) {
+            (1, 0, 0) => "held",
+            (0, 1, 0) => "coasting",
+            (0, 0, 1) => "lost",
+            other => panic!("{other:?}"),
         }
     };
     assert_eq!(

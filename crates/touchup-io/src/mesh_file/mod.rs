@@ -12,6 +12,7 @@ mod stl;
 mod text;
 mod unit;
 
+use std::io;
 use std::path::{Path, PathBuf};
 
 use nalgebra::Point3;
@@ -370,6 +371,7 @@ pub fn write_mesh_with(
     Ok(write_file(path, |out| match kind {
         FileKind::Stl => stl::write(&soup, &unit, out),
         FileKind::Obj => obj::write(&soup, &ids, columns, texture, [&unit, &materials], out),
-        _ => ply::write(&soup, &ids, columns, texture, &unit, out),
+        FileKind::Ply => ply::write(&soup, &ids, columns, texture, &unit, out),
+        _ => Err(io::ErrorKind::Unsupported.into()),
     })?)
 }

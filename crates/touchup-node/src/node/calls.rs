@@ -35,7 +35,6 @@ const LARGEST_RADIUS: f64 = 1.0;
 const MOST_STROKES: u32 = 1000;
 /// Maximum wait for the complete mesh and patch of a file.
 const COPY_WAIT: Duration = Duration::from_secs(30);
-/// Default name of a file.
 /// Maximum number of concurrent saves: each has a copy of all touches.
 const MOST_SAVING: usize = 4;
 

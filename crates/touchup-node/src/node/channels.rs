@@ -5,7 +5,7 @@ use std::sync::mpsc::SyncSender;
 
 use nalgebra::Point3;
 
-use crate::ros::mesh_feed::{Edits, VertexCertainty};
+use crate::ros::mesh_feed::{Edits, VertexUncertainty};
 use crate::ros::messages::{
     DetectFeaturesRequest, DetectFeaturesResponse, FlagFeatureResponse, UnflagFeatureResponse,
 };
@@ -19,8 +19,8 @@ use touchup_session::live::TouchDelta;
 pub enum ViewInput {
     /// a change of the mesh
     Edits(Box<Edits>),
-    /// version of the mesh with this certainty of its vertices
-    Certainty(u64, VertexCertainty),
+    /// version of the mesh with this uncertainty of its vertices
+    Uncertainty(u64, VertexUncertainty),
     /// name of a new session
     Session(String),
     /// a touched face and its signed distance, m; only with tiles coloured by mismatch

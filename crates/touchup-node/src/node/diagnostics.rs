@@ -364,9 +364,11 @@ impl RefinementWorker {
             setup,
             session,
             side_work,
+            uncertainty,
             ..
         } = self;
         side_work.finish();
+        uncertainty.threads.finish();
         Ok(NodeEnd {
             folder,
             report: session.end(&setup, report)?,

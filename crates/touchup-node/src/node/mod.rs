@@ -4,16 +4,15 @@
 //! touched surface beside it if the scene has a patch, `view` publishes the mesh, `features` finds
 //! and fits features, `recorder` writes down the accepted messages, `arm` moves an arm if there is
 //! one. Between them are bounded queues; a full one first drops, and counts, inputs for viewing
-//! only. Each longer piece of work beside (a save, certainty, a check of the input, removal of a
+//! only. Each longer piece of work beside (a save, uncertainty, a check of the input, removal of a
 //! touch) has a short-lived thread, and the port has those of its network.
 
 mod arm;
 mod calls;
-mod certainty;
 mod channels;
 mod diagnostics;
 mod error;
-mod evaluating_certainty;
+mod evaluating_uncertainty;
 mod feature_messages;
 mod feature_worker;
 mod input;
@@ -27,6 +26,7 @@ mod shared;
 mod side_work;
 mod strokes;
 mod take_out;
+mod uncertainty;
 mod viewing;
 
 pub use arm::{ArmKind, ArmOfNode};

@@ -10,7 +10,6 @@ use std::time::{Duration, Instant};
 use tracing::warn;
 
 use super::arm::ArmHandle;
-use super::certainty::CertaintyWork;
 use super::channels::{FeatureInput, ViewInput};
 use super::error::NodeError;
 use super::input::acceptance::Acceptance;
@@ -21,6 +20,7 @@ use super::session::{NodeEnd, NodeSession};
 use super::setup::Setup;
 use super::side_work::SideWork;
 use super::take_out::TakingOut;
+use super::uncertainty::UncertaintyWork;
 use crate::ros::convert::frame_transform;
 use crate::ros::inbox::Arrivals;
 use crate::ros::mesh_feed::Edits;
@@ -89,8 +89,8 @@ pub struct RefinementWorker {
     pub(super) side_work: SideWork,
     /// running removal or restoration of a touch
     pub(super) taking_out: Option<TakingOut>,
-    /// computation of the certainty of vertices, for followers of the mesh
-    pub(super) certainty: CertaintyWork,
+    /// computation of the uncertainty of vertices, for followers of the mesh
+    pub(super) uncertainty: UncertaintyWork,
     pub(super) sampled: Instant,
     /// time of the last sample before the last change of the mesh
     pub(super) moved: Instant,
@@ -122,7 +122,7 @@ impl RefinementWorker {
             mismatch_rate_hz: setup.shared.parameters().double("mismatch_rate_hz"),
             side_work: SideWork::on(setup.clock.clone()),
             taking_out: None,
-            certainty: CertaintyWork::default(),
+            uncertainty: UncertaintyWork::on(setup.clock.clone()),
             doubts: InputDoubts::on(&setup.clock),
             moving: setup
                 .pose_frames
@@ -451,7 +451,7 @@ impl RefinementWorker {
             }
             self.go_on_taking_out();
             self.send_edits();
-            self.go_on_with_certainty(now);
+            self.go_on_with_uncertainty(now);
             self.send_probed();
             self.retry_waiting();
             if !self.session.keeping.is_replayed() {
@@ -478,7 +478,7 @@ impl RefinementWorker {
         (self.resolver.axes, self.waiting, self.mismatch_ns) = (None, Default::default(), i64::MIN);
         // changes of the previous session do not apply to this one
         self.doubts.restart();
-        self.certainty.restart();
+        self.uncertainty.restart();
         self.give_up_taking_out("a new session has begun");
         self.edits.iter_mut().for_each(|edits| edits.clear());
         std::mem::replace(&mut self.session, next)

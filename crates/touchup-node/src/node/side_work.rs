@@ -67,6 +67,8 @@ impl SideWork {
     /// # Errors
     /// Of the operating system, if no thread is available.
     pub fn begin(&mut self, name: &str, work: impl FnOnce() + Send + 'static) -> io::Result<()> {
+        // a thread that has ended keeps its stack until its handle goes
+        self.count();
         self.threads.push(begin_behind(&self.clock, name, work)?);
         Ok(())
     }

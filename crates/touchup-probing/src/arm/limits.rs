@@ -30,8 +30,8 @@ parameters! {
         ///
         /// m in B.
         highest: Point3<f64> = [0.0; 3], "workspace_high_mm" [MM, -5000, 5000];
-        /// Lowest corner of the box that the arm except its base must not leave, in the base of the
-        /// arm, such as table and walls; left out: no such bound.
+        /// Lowest corner of the box that the arm except its base must not leave, bounded by table and
+        /// walls for example, in the base of the arm; left out: no such bound.
         ///
         /// m in B.
         arm_lowest: Option<Point3<f64>> = None, "arm_low_mm" [MM, -5000, 5000] like "[-2000, -2000, 0]";

@@ -189,7 +189,7 @@ impl DryRun<'_> {
     }
 }
 
-/// First contact of a ball with the mesh/// First contact of a ball with the mesh, by sphere tracing: each step is the remaining distance.
+/// First contact of a ball with the mesh, by sphere tracing: each step is the remaining distance.
 fn contact_on_mesh(planned: &TouchPlan, pattern: &PatternParams, world: &dyn World) -> TouchResult {
     let (
         PatternParams {

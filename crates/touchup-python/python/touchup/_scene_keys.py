@@ -259,9 +259,9 @@ class Sliding(TypedDict, total=False):
 
 
 class Carve(TypedDict, total=False):
-    """Carving by free space: removes surface that the tip passes through without a force, in the haptic update
-    and in the patch. Off: lids over holes stay. The keys are for the haptic update; in the patch free space
-    counts as touches do."""
+    """Carving and free space: the haptic update and the patch remove surface that the tip passes through
+    without a force. Off: lids over holes stay. The keys are for carving, by the haptic update; in the patch
+    free space counts as touches do."""
 
     rate_per_s: float
     """Share of the depth removed per second. — [1/s] 0 to 1e+06; default `300`"""
@@ -428,8 +428,8 @@ class Robot(TypedDict, total=False):
     than workspace_low_mm. — [mm] -5000 to 5000; default `[0, 0, 0]`"""
 
     arm_low_mm: list[float]
-    """Lowest corner of the box that the arm except its base must not leave, in the base of the arm, such as
-    table and walls; left out: no such bound. — [mm] -5000 to 5000"""
+    """Lowest corner of the box that the arm except its base must not leave, bounded by table and walls for
+    example, in the base of the arm; left out: no such bound. — [mm] -5000 to 5000"""
 
     arm_high_mm: list[float]
     """Highest corner of the box that the arm except its base must not leave, in the base of the arm; left out:
@@ -562,7 +562,7 @@ class Refine(TypedDict, total=False):
 
     turning_per_s: float
     """Turning rate of a face to the measured normal, independent of the force, in place of beta; left out: the
-    value of the mode. — [1/s] 0 to 1e+06"""
+    value of the mode, or off if beta_per_n2_s is given. — [1/s] 0 to 1e+06"""
 
     step: Literal["lie", "corrected", "bounded", "dp5"]
     """Integration of position and normal: one after the other (lie), with a correction (corrected), coupled to
@@ -574,7 +574,8 @@ class Refine(TypedDict, total=False):
 
     roi_mm: float
     """Radius of the region of interest: vertices within this distance of the touched face follow it; left out:
-    the radius of the ball, and in mode paper one ring of faces. — [mm] 0 to 1000"""
+    the radius of the ball or the size of another tip, for a ball in mode paper one ring of faces. — [mm] 0 to
+    1000"""
 
     f_max_n: float
     """Largest force of the sigmoid of Eq 3. — [N] 1e-06 to 1e+06; default `10`"""
@@ -634,9 +635,9 @@ class Scene(TypedDict, total=False):
     the past; of them the patch uses only the cone, as it looks ahead."""
 
     carve: Carve | Literal[False, "off"] | None
-    """Carving by free space: removes surface that the tip passes through without a force, in the haptic update
-    and in the patch. Off: lids over holes stay. The keys are for the haptic update; in the patch free space
-    counts as touches do."""
+    """Carving and free space: the haptic update and the patch remove surface that the tip passes through
+    without a force. Off: lids over holes stay. The keys are for carving, by the haptic update; in the patch
+    free space counts as touches do."""
 
     guard: Guard | Literal[False, "off"] | None
     """Guard of the mesh: cuts back an update that would exceed one of these limits. Off: no limits, as in the

@@ -190,7 +190,7 @@ fn surface_cases<'a>(
     ]
 }
 
-/// A separate mesh whose boxes follow it./// A separate mesh whose boxes follow it./// A separate mesh whose boxes follow it.
+/// A separate mesh whose boxes follow it.
 struct MovingMesh {
     mesh: TriMesh,
     tree: FaceTree,

@@ -44,9 +44,19 @@ impl Setting {
     }
 
     /// The path of a file, in quotes.
-    pub fn file(path: &'static str, file: &Path) -> Self {
-        let file = file.display().to_string().replace('\'', "''");
-        Self::word(path, format!("'{file}'"))
+    ///
+    /// # Errors
+    /// [`SceneError::CannotEdit`] for a name with bytes or characters that no line of text has.
+    pub fn file(path: &'static str, file: &Path) -> Result<Self, SceneError> {
+        match file.to_str() {
+            Some(name) if !name.contains(char::is_control) => {
+                Ok(Self::word(path, format!("'{}'", name.replace('\'', "''"))))
+            }
+            _ => Err(SceneError::CannotEdit {
+                why: "the name of the file is not one line of text".to_owned(),
+                settings: format!("{path}: {}", file.display()),
+            }),
+        }
     }
 }
 

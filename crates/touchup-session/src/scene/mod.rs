@@ -84,8 +84,8 @@ parameters! {
         /// haptic update, which knows only the past; of them the patch uses only the cone, as it
         /// looks ahead.
         sliding: Option<SlidingParams> = Some(Default::default()), "sliding";
-        /// Carving by free space: removes surface that the tip passes through without a force, in
-        /// the haptic update and in the patch. Off: lids over holes stay. The keys are for the
+        /// Carving and free space: the haptic update and the patch remove surface that the tip passes
+        /// through without a force. Off: lids over holes stay. The keys are for carving, by the
         /// haptic update; in the patch free space counts as touches do.
         carve: Option<CarveParams> = Some(Default::default()), "carve";
         /// Guard of the mesh: cuts back an update that would exceed one of these limits. Off: no

@@ -266,7 +266,7 @@ parameters! {
         /// of the mode.
         beta: Option<f64> = None, "beta_per_n2_s" [PER_N2_S, 0, 1e9] like "0.1";
         /// Turning rate of a face to the measured normal, independent of the force, in place of
-        /// beta; left out: the value of the mode.
+        /// beta; left out: the value of the mode, or off if beta_per_n2_s is given.
         turning: Option<f64> = None, "turning_per_s" [PER_S, 0, 1e6] like "30";
         /// Integration of position and normal: one after the other (lie), with a correction
         /// (corrected), coupled to 1e-9 (bounded, as with mode paper), or by adaptive Runge–Kutta
@@ -276,7 +276,8 @@ parameters! {
         /// 6), or the force (force); left out: the value of the mode.
         along: Option<MotionDirection> = None, "along" like "force";
         /// Radius of the region of interest: vertices within this distance of the touched face
-        /// follow it; left out: the radius of the ball, and in mode paper one ring of faces.
+        /// follow it; left out: the radius of the ball or the size of another tip, for a ball in mode
+        /// paper one ring of faces.
         ///
         /// m.
         roi: Option<f64> = None, "roi_mm" [MM, 0, 1000] like "1.5";

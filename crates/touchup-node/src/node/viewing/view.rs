@@ -106,8 +106,8 @@ impl ViewWorker {
                 // the channel has room for all lists
                 let _ = self.spare.try_send(edits);
             }
-            ViewInput::Certainty(version, certainty) => {
-                self.shared.mesh.apply_certainty(version, certainty);
+            ViewInput::Uncertainty(version, uncertainty) => {
+                self.shared.mesh.apply_uncertainty(version, uncertainty);
             }
             ViewInput::Session(name) => {
                 self.shared.mesh.begin_session(&name);

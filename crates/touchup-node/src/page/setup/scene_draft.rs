@@ -170,7 +170,7 @@ impl SceneDraft {
             }));
         }
         if let Some((file, unit)) = scan {
-            settings.push(Setting::file("scan.file", Path::new(file)));
+            settings.push(Setting::file("scan.file", Path::new(file))?);
             settings.push(Setting::word("scan.unit", unit));
         }
         let mut scene = self.scene.clone();

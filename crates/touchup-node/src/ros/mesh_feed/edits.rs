@@ -17,9 +17,9 @@ pub type VertexPlace = (Point3<f64>, Support);
 /// Number of a face and its corners; `None`: removed.
 pub type FaceEdit = (u32, Option<[u32; 3]>);
 
-/// Certainty of the touched vertices of one version.
+/// Uncertainty of the touched vertices of one version.
 #[derive(Clone, Debug, Default)]
-pub struct VertexCertainty {
+pub struct VertexUncertainty {
     /// changed variances along the normal, m², by vertex
     pub variances: Vec<(u32, f32)>,
     /// vertices beside a rejected contact

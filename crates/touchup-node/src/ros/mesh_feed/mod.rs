@@ -18,7 +18,7 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex};
 
 pub use self::cursor::MeshCursor;
-pub use self::edits::{Edits, FACES_OF_A_TILE, VertexCertainty};
+pub use self::edits::{Edits, FACES_OF_A_TILE, VertexUncertainty};
 pub use self::version::MeshVersion;
 use crate::ros::locked;
 use crate::ros::messages::MeshPatch;
@@ -114,10 +114,10 @@ impl MeshFeed {
         self.answer(&mut state);
     }
 
-    /// Applies the certainty of vertices, as the next version if variances change.
-    pub fn apply_certainty(&self, version: u64, certainty: VertexCertainty) {
+    /// Applies the uncertainty of vertices, as the next version if variances change.
+    pub fn apply_uncertainty(&self, version: u64, uncertainty: VertexUncertainty) {
         let mut state = locked(&self.state);
-        let changed = Arc::make_mut(&mut state.mesh).apply_certainty(version, certainty);
+        let changed = Arc::make_mut(&mut state.mesh).apply_uncertainty(version, uncertainty);
         for cursor in state.cursors.values_mut() {
             cursor.note(&changed, &[]);
         }
@@ -353,11 +353,11 @@ mod tests {
         feed.announce(3);
         let waiting = feed.complete();
         let follower = feed.follow_from_now();
-        let known = |outliers: &[u32]| VertexCertainty {
+        let known = |outliers: &[u32]| VertexUncertainty {
             variances: vec![(0, 1e-10), (1, 4e-10), (500, 1e-10)],
             outliers: outliers.to_vec(),
         };
-        feed.apply_certainty(3, known(&[1]));
+        feed.apply_uncertainty(3, known(&[1]));
         let sent = follower.next_part(1000).unwrap();
         assert_eq!(
             (sent.vertices, waiting.try_recv().unwrap().version),

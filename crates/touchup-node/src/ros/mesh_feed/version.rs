@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::Point3;
 
 use super::blocks::Blocks;
-use super::edits::{Edits, VertexCertainty, VertexPlace};
+use super::edits::{Edits, VertexPlace, VertexUncertainty};
 use touchup_geometry::mesh::{FaceId, FaceTree, MeshError, TriMesh, VertexId};
 use touchup_method::reconstruct::Support;
 
@@ -157,12 +157,12 @@ impl MeshVersion {
         changed
     }
 
-    /// Applies the certainty of vertices; returns the changed vertices.
-    pub fn apply_certainty(&mut self, version: u64, certainty: VertexCertainty) -> Vec<u32> {
+    /// Applies the uncertainty of vertices; returns the changed vertices.
+    pub fn apply_uncertainty(&mut self, version: u64, uncertainty: VertexUncertainty) -> Vec<u32> {
         self.version = version;
-        self.outliers = certainty.outliers.into();
+        self.outliers = uncertainty.outliers.into();
         let mut changed = Vec::new();
-        for (vertex, variance) in certainty.variances {
+        for (vertex, variance) in uncertainty.variances {
             if self.vertex(vertex).is_some() {
                 self.vertex_mut(vertex).variance = variance;
                 changed.push(vertex);

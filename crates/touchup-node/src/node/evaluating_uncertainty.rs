@@ -1,4 +1,4 @@
-//! Certainty of touched vertices, for all followers of the mesh: computed on a thread of its own
+//! Uncertainty of touched vertices, for all followers of the mesh: computed on a thread of its own
 //! once the mesh rests, if there are followers.
 //!
 //! The mesh with other variances is the next version, so followers handle it as any other change;
@@ -10,10 +10,10 @@ use std::time::{Duration, Instant};
 
 use tracing::warn;
 
-use crate::node::certainty::certainty_of;
 use crate::node::channels::ViewInput;
 use crate::node::refinement::{RefinementWorker, SETTLES_AFTER};
-use crate::ros::mesh_feed::VertexCertainty;
+use crate::node::uncertainty::uncertainty_of;
+use crate::ros::mesh_feed::VertexUncertainty;
 
 /// Time from the last sample of a change until the mesh rests: longer than the node takes to settle
 /// it.
@@ -23,21 +23,21 @@ const COPY_WAIT: Duration = Duration::from_secs(30);
 
 impl RefinementWorker {
     /// Starts the computation when due, and passes on its result; never waits.
-    pub(super) fn go_on_with_certainty(&mut self, now: Instant) {
+    pub(super) fn go_on_with_uncertainty(&mut self, now: Instant) {
         let version = self.session.version;
-        if let Some((of, made)) = self.certainty.made.take() {
+        if let Some((of, made)) = self.uncertainty.made.take() {
             match made.try_recv() {
                 // only one computation at a time, even if the mesh has changed
-                Err(TryRecvError::Empty) => self.certainty.made = Some((of, made)),
-                Ok(certainty) if of == version && self.is_at_rest(now) => {
-                    self.send_certainty(certainty)
+                Err(TryRecvError::Empty) => self.uncertainty.made = Some((of, made)),
+                Ok(uncertainty) if of == version && self.is_at_rest(now) => {
+                    self.send_uncertainty(uncertainty)
                 }
                 Ok(_) => {}
                 // without thread, mesh or evidence: the next change of the mesh tries again
-                Err(TryRecvError::Disconnected) => self.certainty.done = of,
+                Err(TryRecvError::Disconnected) => self.uncertainty.done = of,
             }
-        } else if self.certainty.done != version && self.is_followed() && self.is_at_rest(now) {
-            self.begin_certainty(version);
+        } else if self.uncertainty.done != version && self.is_followed() && self.is_at_rest(now) {
+            self.begin_uncertainty(version);
         }
     }
 
@@ -65,10 +65,10 @@ impl RefinementWorker {
         has_pages || has_listeners(self.port.mesh_patch_topic())
     }
 
-    fn begin_certainty(&mut self, version: u64) {
+    fn begin_uncertainty(&mut self, version: u64) {
         let Ok(Some(copy)) = self.session.engine.copy_patcher() else {
             // no touches, or no patch
-            self.certainty.done = version;
+            self.uncertainty.done = version;
             return;
         };
         let setup = Arc::clone(&self.setup);
@@ -84,25 +84,25 @@ impl RefinementWorker {
             };
             patcher.flush();
             // the node may have ended
-            let _ = to.send(certainty_of(&mesh, &setup.input.scan, &mut patcher));
+            let _ = to.send(uncertainty_of(&mesh, &setup.input.scan, &mut patcher));
         };
-        if let Err(error) = self.side_work.begin("certainty", work) {
-            warn!(%error, "no thread to evaluate variances on: mesh_patch has none until the mesh changes again");
+        if let Err(error) = self.uncertainty.threads.begin("uncertainty", work) {
+            warn!(%error, "no thread for the uncertainty of vertices: the mesh has none until it changes again");
         }
-        self.certainty.made = Some((version, made));
+        self.uncertainty.made = Some((version, made));
     }
 
-    fn send_certainty(&mut self, certainty: VertexCertainty) {
-        let version = self.session.version + u64::from(!certainty.variances.is_empty());
+    fn send_uncertainty(&mut self, uncertainty: VertexUncertainty) {
+        let version = self.session.version + u64::from(!uncertainty.variances.is_empty());
         // a busy view gets it with the next computation
         if self
             .view
-            .try_send(ViewInput::Certainty(version, certainty))
+            .try_send(ViewInput::Uncertainty(version, uncertainty))
             .is_ok()
         {
             (self.session.version, self.session.sent_version) = (version, version);
             self.setup.shared.mesh.announce(version);
-            self.certainty.done = version;
+            self.uncertainty.done = version;
         }
     }
 }

@@ -1,26 +1,39 @@
-//! Certainty of the touched vertices of a mesh, and the state of its computation.
+//! Uncertainty of the touched vertices of a mesh, and the state of its computation.
 
 use std::sync::mpsc::Receiver;
 
 use nalgebra::Point3;
 
-use crate::ros::mesh_feed::{MeshVersion, VertexCertainty};
+use super::side_work::SideWork;
+use crate::ros::mesh_feed::{MeshVersion, VertexUncertainty};
 use touchup_geometry::mesh::{FaceTree, TriMesh};
 use touchup_method::reconstruct::Patcher;
+use touchup_session::clock::Clock;
 
 /// Radius of marked vertices around a rejected contact, m.
 const BESIDE_OUTLIER: f64 = 1e-3;
 
 /// Running and last computation for a session.
-#[derive(Debug, Default)]
-pub struct CertaintyWork {
+#[derive(Debug)]
+pub struct UncertaintyWork {
+    /// its threads
+    pub threads: SideWork,
     /// version of the last one, successful or not; 0: none
     pub done: u64,
     /// running one: its version, 0 for that of another session, and its result
-    pub made: Option<(u64, Receiver<VertexCertainty>)>,
+    pub made: Option<(u64, Receiver<VertexUncertainty>)>,
 }
 
-impl CertaintyWork {
+impl UncertaintyWork {
+    /// No computation yet. All waits use `clock`.
+    pub fn on(clock: Clock) -> Self {
+        Self {
+            threads: SideWork::on(clock),
+            done: 0,
+            made: None,
+        }
+    }
+
     /// Begins with another session.
     pub fn restart(&mut self) {
         self.done = 0;
@@ -28,12 +41,12 @@ impl CertaintyWork {
     }
 }
 
-/// Certainty of the touched vertices in their order; no variances if the scene has no uncertainty.
-pub fn certainty_of(
+/// Uncertainty of the touched vertices in their order; no variances if the scene has no uncertainty.
+pub fn uncertainty_of(
     mesh: &MeshVersion,
     (scan, tree): &(TriMesh, FaceTree),
     patcher: &mut Patcher,
-) -> VertexCertainty {
+) -> VertexUncertainty {
     let (vertices, places): (Vec<u32>, Vec<_>) = mesh.touched().unzip();
     let sigmas = patcher.sigma_at(scan, tree, &places);
     let variances = sigmas.iter().map(|sigma| (sigma * sigma) as f32);
@@ -52,7 +65,7 @@ pub fn certainty_of(
     };
     let outliers = vertices.iter().zip(&places);
     let outliers = outliers.filter(|(_, (place, _))| is_beside(place));
-    VertexCertainty {
+    VertexUncertainty {
         variances: variances.filter(is_new).collect(),
         outliers: outliers.map(|(vertex, _)| *vertex).collect(),
     }
