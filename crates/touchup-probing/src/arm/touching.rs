@@ -282,7 +282,7 @@ struct SurfaceSearch<'a> {
     velocity: Vector3<f64>,
     /// consecutive states in contact
     contacts: u32,
-    /// travel of the ball so far, m
+    /// travel of the ball, m
     reached: f64,
 }
 

@@ -113,7 +113,7 @@ pub fn plan(
     Ok(dry_run.plan)
 }
 
-/// A dry run so far.
+/// State of a dry run.
 struct DryRun<'a> {
     space: ArmFreeSpace<'a>,
     /// orientation of the tool at the touches

@@ -373,7 +373,7 @@ mod tests {
             let least = shaft_room.min(ball_room);
             // only that part of the mesh is reported
             prop_assert!(room <= least + 1e-12 || (room < 0.0 && least < 0.0), "{room} of {shaft_room} {ball_room}");
-            // and not less than half of what there is beyond the balls that model the shaft
+            // and not less than half of the room beyond the balls that model the shaft
             let spare = tool.shaft_radius * (1.25f64.sqrt() - 1.0);
             let there = (shaft_room - spare).min(ball_room);
             prop_assert!(room >= (there / 2.0).min(there).min(reach / 2.0) - 1e-12, "{room} of {there}");
