@@ -79,6 +79,7 @@ shard_4() {
   title "Machined parts"
   slow_python test_machined.py
   markdown test_machined::test_touched_parts_in_three_worlds "Parts of another modeller in three worlds"
+  markdown test_machined::test_touched_parts_in_a_foreign_world "Parts of another modeller in another simulator"
 }
 
 # engines of a sweep, on a cluster of this machine

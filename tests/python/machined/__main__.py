@@ -1,8 +1,8 @@
 """python -m machined TOUCHUP OUT [--seeds A-B] [--worlds W,...] [--scanner cheap|good]: parts scanned, touched, refined and judged.
 
-Each part has its own folder: the true part, its scan and recording by `touchup simulate`, refined mesh, features and touches. A folder with
-a recording goes through refinement again, not through simulation. Prints missed and invented features, and a table; --json writes the same
-for `machined.plots` and `machined.failures`.
+Each part has its own folder: the true part, its scan and recording by `touchup simulate` or by the world `foreign`, refined mesh, features
+and touches. A folder with a recording goes through refinement again, not through simulation. Prints missed and invented features,
+and a table; --json writes the same for `machined.plots` and `machined.failures`.
 """
 
 import argparse
@@ -18,7 +18,7 @@ def main():
     parser.add_argument("touchup", type=Path)
     parser.add_argument("out", type=Path)
     parser.add_argument("--seeds", default="0-23")
-    parser.add_argument("--worlds", default=",".join(WORLDS), help="worlds of touchup simulate; plain: none")
+    parser.add_argument("--worlds", default=",".join(WORLDS), help="worlds of touchup simulate; plain: none; foreign: python -m foreign")
     parser.add_argument("--scanner", choices=["cheap", "good"])
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--json", type=Path, help="verdicts, one for each part")

@@ -2,8 +2,10 @@
 
 import json
 import subprocess
+import sys
 from collections import defaultdict
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import trimesh
@@ -15,6 +17,8 @@ from .judge import TOUCHED, Verdict, described, judge
 from .part import Part
 
 WORLDS = ["workshop_stylus", "ur", "optical_tracker"]
+# the world of the package `foreign`
+FOREIGN = "foreign"
 SIDES = {"shaft": "z,y,-y,x", "bracket": "z,-x,x", "sheet": "z"}
 # distance from a contact within which a point of a wall counts as touched, mm
 NEAR_MM = 1.0
@@ -125,6 +129,12 @@ def run(command, **more):
 def simulated(touchup, folder, seed, family, world, scanner):
     """Scan, recording and true contacts of the part in a folder."""
     sides = SIDES.get(family, "z,y,-y,x,-x")
+    if world == FOREIGN:
+        command = [sys.executable, "-m", "foreign", folder.resolve(), "--seed", seed, f"--sides={sides}"]
+        done = run(command, cwd=Path(__file__).parent.parent)
+        if done.returncode != 0:
+            raise Failed(done.stderr)
+        return
     options = ["--world", world] if world else []
     options += ["--scanner", scanner] if scanner else []
     command = [touchup, "simulate", "--truth", folder / "part.stl", "--out", folder, "--seed", seed, f"--sides={sides}", *options]
@@ -133,10 +143,10 @@ def simulated(touchup, folder, seed, family, world, scanner):
         raise Failed(done.stderr)
 
 
-def checked_scene(touchup, folder):
+def checked_scene(touchup, folder, recording):
     """The scene of a world, with the clock drift that `touchup doctor` reports, as a user would enter it."""
     scene = folder / "scene.yaml"
-    done = run([touchup, "doctor", folder / "scan.ply", folder / "touch.mcap", "--scene", scene, "--json"])
+    done = run([touchup, "doctor", folder / "scan.ply", recording, "--scene", scene, "--json"])
     # 3: surely wrong, which a clock that drifts is; 4: the recordings lose messages on purpose
     if done.returncode not in (0, 3, 4):
         raise Failed(done.stderr)
@@ -151,9 +161,10 @@ def checked_scene(touchup, folder):
 
 
 def refined(touchup, folder, world):
-    files = ["--scan", folder / "scan.ply", "--bag", folder / "touch.mcap", "--out", folder / "refined.ply"]
+    recording = folder / ("touch.csv" if world == FOREIGN else "touch.mcap")
+    files = ["--scan", folder / "scan.ply", "--bag", recording, "--out", folder / "refined.ply"]
     files += ["--features-out", folder / "features.json", "--touches-out", folder / "touches.csv"]
-    options = ["--scene", checked_scene(touchup, folder)] if world else ["--mesh-unit", "mm", "--tip-radius-mm", "1.5", "--stiffness-n-per-mm", "20"]
+    options = ["--scene", checked_scene(touchup, folder, recording)] if world else ["--mesh-unit", "mm", "--tip-radius-mm", "1.5", "--stiffness-n-per-mm", "20"]
     done = run([touchup, "refine", *files, *options, "--json"])
     (folder / "refine.log").write_text(done.stdout + done.stderr)
     # 4: the recordings lose messages on purpose
