@@ -160,6 +160,7 @@ fn feature_table(
     Detection {
         features,
         unexplained,
+        ..
     }: &Detection,
 ) -> String {
     let mut lines = Vec::new();

@@ -8,7 +8,7 @@ use super::by_contacts::contact_slots::contact_slots;
 use super::by_contacts::contact_walls::add_contact_walls;
 use super::cones::add_cones;
 use super::feature::{Feature, FeatureKind, FittedTo, Form, MeasuredValue, Walls};
-use super::fit::{Fit, Freedom, Plane, Stadium, SurfaceModel};
+use super::fit::{Fit, Freedom, Plane, Stadium, SurfaceModel, TouchNoise};
 use super::holes::{Boss, Hole, bosses, groups, holes};
 use super::measure::{FittedSurface, Measure};
 use super::observe::{NOT_ALIKE, SegmentTouches};
@@ -28,6 +28,8 @@ pub struct Detection {
     pub features: Vec<Feature>,
     /// share of the area that no plane, cylinder or cone explains
     pub unexplained: f64,
+    /// errors of the touches that do not repeat
+    pub noise: TouchNoise,
 }
 
 /// Minimum width of a reported plane, in tolerances.
@@ -97,6 +99,7 @@ pub fn detect(mesh: &TriMesh, touches: &[ProbedPoint]) -> Detection {
     Detection {
         features,
         unexplained: unexplained(&parted),
+        noise: observed.noise,
     }
 }
 

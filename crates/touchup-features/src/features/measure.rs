@@ -391,12 +391,9 @@ impl<'a> Measure<'a> {
         axis_sigma: Option<f64>,
         around: Option<usize>,
     ) -> FittedSurface<S> {
-        let [common_sigma, shift_sigma] = self.observed.systematic(&touches);
         let params = FitParams {
-            common_sigma,
-            shift_sigma,
             axis_sigma,
-            ..FitParams::default()
+            ..self.observed.fit_params(&touches)
         };
         if !touches.is_empty()
             && let Ok(found) = fit(guess, &self.observed.of_touches(&touches), &params)

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::Point3;
 
-use super::fit::{Observation, SurfaceModel};
+use super::fit::{FitParams, Observation, SurfaceModel, TouchNoise, Visit};
 use super::segmentation::facets::NONE;
 use super::segmentation::marks::NumberSet;
 use super::segmentation::primitive::Primitive;
@@ -24,6 +24,8 @@ pub(super) struct SegmentTouches<'a> {
     group: Vec<u32>,
     /// numbers of the touches by place
     grid: PointGrid,
+    /// errors of the touches that do not repeat
+    pub noise: TouchNoise,
     /// maximum distance from a touch to a touched place, m
     reach: f64,
 }
@@ -40,6 +42,8 @@ const NEAR_TOLERANCES: f64 = 3.0;
 const NEAR_RADII: f64 = 0.15;
 /// Cosine of the tolerance of its normal: 40°, friction and edges.
 const ALIKE: f64 = 0.77;
+/// Cosine of the maximum lean of a normal from a face: 14°, friction; on an edge it leans more.
+const ON_FACE: f64 = 0.97;
 /// Maximum distance of a touched place for a tip without a ball, m.
 const REACH: f64 = 1e-3;
 /// Minimum standard deviation, m: unstated ones follow from the residuals.
@@ -74,6 +78,7 @@ impl<'a> SegmentTouches<'a> {
             of_segment: vec![Vec::new(); parted.segmentation.segments.len()],
             group: groups(touches),
             grid: PointGrid::new(reach),
+            noise: TouchNoise::default(),
             reach,
         };
         for (number, touch) in touches
@@ -86,7 +91,32 @@ impl<'a> SegmentTouches<'a> {
                 observed.grid.insert(number as u32, &touch.point);
             }
         }
+        let visits = (0..observed.of_segment.len()).map(|segment| observed.visits(segment));
+        observed.noise = TouchNoise::of(visits, reach);
         observed
+    }
+
+    /// Visits of the stylus to a segment, without touches of its edges.
+    fn visits(&self, segment: usize) -> Vec<Visit> {
+        let primitive = &self.parted.segment(segment).primitive;
+        let on_face = |&number: &u32| {
+            let touch = self.touch(number);
+            let (distance, normal) = primitive.distance_and_normal(&touch.centre);
+            let visit = Visit {
+                group: self.group[number as usize],
+                point: touch.point,
+                residual: distance - touch.radius,
+            };
+            (normal.dot(&touch.normal) > ON_FACE).then_some(visit)
+        };
+        let touches: Vec<Visit> = self.of_segment[segment]
+            .iter()
+            .filter_map(on_face)
+            .collect();
+        touches
+            .chunk_by(|a, b| a.group == b.group)
+            .map(Visit::joined)
+            .collect()
     }
 
     fn segment_of(&self, of_face: &[u32], touch: &ProbedPoint) -> Option<usize> {
@@ -141,6 +171,17 @@ impl<'a> SegmentTouches<'a> {
             observation(&self.touches[number as usize], self.group[number as usize])
         };
         numbers.iter().map(observation).collect()
+    }
+
+    /// Parameters of a fit to touches, without a prior axis.
+    pub(crate) fn fit_params(&self, numbers: &[u32]) -> FitParams {
+        let [common_sigma, shift_sigma] = self.systematic(numbers);
+        FitParams {
+            common_sigma,
+            shift_sigma,
+            noise: self.noise,
+            ..FitParams::default()
+        }
     }
 
     /// Standard deviations that do not average out, m: common error of all touches along their
@@ -375,19 +416,25 @@ fn is_on_chord(
         .any(|a| around.iter().any(|b| is_between(a, b)))
 }
 
-/// Numbers of the groups of touches that share their error.
+/// Numbers of the groups of touches that share their error, by their time: they ascend, by one in
+/// [`SHARED_NS`] or, for a new stroke, earlier.
 pub(super) fn groups(touches: &[ProbedPoint]) -> Vec<u32> {
-    let mut last: Option<(u32, i64)> = None;
-    let mut group = 0;
-    let mut number = |touch: &ProbedPoint| {
-        let is_same = last.is_some_and(|(stroke, begun)| {
-            touch.stroke == stroke && touch.stamp_ns.saturating_sub(begun) < SHARED_NS
-        });
-        if !is_same {
-            group += u32::from(last.is_some());
-            last = Some((touch.stroke, touch.stamp_ns));
+    let first = touches.first().map_or(0, |touch| touch.stamp_ns);
+    // stroke, begin and number of the last group
+    let mut last: Option<(u32, i64, u32)> = None;
+    let mut number = |touch: &ProbedPoint| match last {
+        Some((stroke, begun, group))
+            if touch.stroke == stroke && touch.stamp_ns.saturating_sub(begun) < SHARED_NS =>
+        {
+            group
         }
-        group
+        before => {
+            let by_time = touch.stamp_ns.saturating_sub(first).max(0) / SHARED_NS;
+            let next = before.map_or(0, |(.., group)| group.saturating_add(1));
+            let group = next.max(u32::try_from(by_time).unwrap_or(u32::MAX));
+            last = Some((touch.stroke, touch.stamp_ns, group));
+            group
+        }
     };
     touches.iter().map(&mut number).collect()
 }

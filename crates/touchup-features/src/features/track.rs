@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 
 use super::detect::{Detection, detect};
 use super::feature::{Feature, FeatureKind, FittedTo, MeasuredValue, Walls};
-use super::fit::{Cylinder, Fit, FitParams, Freedom, Stadium, SurfaceModel, fit};
+use super::fit::{Cylinder, Fit, FitParams, Freedom, Stadium, SurfaceModel, TouchNoise, fit};
 use super::from_fits::{Touches, axis_of, number};
 use super::observe::{groups, observation, systematic};
 use touchup_geometry::mesh::TriMesh;
@@ -21,6 +21,8 @@ pub struct Tracker {
     features: Vec<Feature>,
     /// share of the area outside all primitives at the last detection
     unexplained: Option<f64>,
+    /// errors of the touches at the last detection
+    noise: TouchNoise,
     next_id: u32,
     /// number of examined touches
     seen: usize,
@@ -52,8 +54,10 @@ impl Tracker {
         let Detection {
             mut features,
             unexplained,
+            noise,
         } = detect(mesh, touches);
         self.unexplained = Some(unexplained);
+        self.noise = noise;
         let mut known = std::mem::take(&mut self.features);
         for feature in &mut features {
             let off = |before: &Feature| (before.centre.value - feature.centre.value).norm();
@@ -113,7 +117,7 @@ impl Tracker {
                 .filter(is_on)
                 .map(|number| number as u32)
                 .collect();
-            if !new.is_empty() && feature.take(&new, touches) {
+            if !new.is_empty() && feature.take(&new, touches, self.noise) {
                 changed.push(feature.id);
             }
         }
@@ -183,7 +187,7 @@ fn is_on(feature: &Feature, touch: &ProbedPoint) -> bool {
 
 impl Feature {
     /// Fits the feature to its touches and the new ones; returns whether the fit held.
-    fn take(&mut self, new: &[u32], touches: &[ProbedPoint]) -> bool {
+    fn take(&mut self, new: &[u32], touches: &[ProbedPoint], noise: TouchNoise) -> bool {
         let known = self
             .main_size()
             .into_iter()
@@ -207,6 +211,7 @@ impl Feature {
             common_sigma,
             shift_sigma,
             axis_sigma,
+            noise,
             ..FitParams::default()
         };
         let is_held = match &self.walls {

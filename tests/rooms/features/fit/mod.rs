@@ -5,6 +5,7 @@ mod monte_carlo;
 mod outliers;
 mod refusals;
 mod slots;
+mod wander;
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use rand::SeedableRng;

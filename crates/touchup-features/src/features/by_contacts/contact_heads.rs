@@ -190,12 +190,9 @@ fn head_wall(
             ..observation
         })
         .collect();
-    let [common_sigma, shift_sigma] = observed.systematic(&numbers);
     let params = FitParams {
-        common_sigma,
-        shift_sigma,
         axis_sigma: Some(1e-3),
-        ..FitParams::default()
+        ..observed.fit_params(&numbers)
     };
     let found = fit(guess, &observations, &params).ok()?;
     let touches = numbers

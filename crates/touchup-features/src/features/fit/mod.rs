@@ -9,7 +9,8 @@
 //!
 //! Observations of one group share their error and count together as one: wᵢ = 1/(σᵢ² n), n the
 //! number of kept observations in the group of i. If errors are shared only in part this gives away
-//! a little, never too much confidence.
+//! a little, never too much confidence. Beyond its group an error is shared by the wander of
+//! [`TouchNoise`].
 //!
 //! Own code on nalgebra: the `levenberg-marquardt` crate asks for another nalgebra (0.34), and the
 //! work is in weights, rank and covariance, which it leaves to its caller.
@@ -19,6 +20,7 @@ mod cone;
 mod cylinder;
 mod error;
 mod estimate;
+mod noise;
 mod observation;
 mod plane;
 mod robust;
@@ -31,6 +33,8 @@ pub use cone::Cone;
 pub use cylinder::Cylinder;
 pub use error::FitError;
 pub use estimate::Fit;
+pub use noise::TouchNoise;
+pub(crate) use noise::Visit;
 pub use observation::{FitParams, Observation};
 pub use plane::Plane;
 pub use robust::fit;

@@ -2,7 +2,7 @@
 
 use nalgebra::Point3;
 
-use super::FitError;
+use super::{FitError, TouchNoise};
 
 /// One measured point and its nominal distance from the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -14,8 +14,8 @@ pub struct Observation {
     pub offset: f64,
     /// Standard deviation along the normal, m, > 0; assumed the same across it.
     pub sigma: f64,
-    /// Observations of one group share their error, those of different groups do not: one pass of
-    /// the stylus over about 0.1 s.
+    /// Observations of one group share their error: one pass of the stylus over about 0.1 s. Those
+    /// of different groups share a wander, by the difference of the group numbers.
     pub group: u32,
 }
 
@@ -33,6 +33,8 @@ pub struct FitParams {
     /// Prior standard deviation of the axis of the first guess, rad in each of two directions;
     /// `None`: no prior. A hole in thin metal has its axis from the plane around it.
     pub axis_sigma: Option<f64>,
+    /// Errors that the stated deviations of the observations lack.
+    pub noise: TouchNoise,
     /// Limit of outliers in standard deviations of the residual. 4 rejects one in 16000 good ones.
     pub rejection: f64,
 }
@@ -43,6 +45,7 @@ impl Default for FitParams {
             common_sigma: 0.0,
             shift_sigma: 0.0,
             axis_sigma: None,
+            noise: TouchNoise::default(),
             rejection: 4.0,
         }
     }
@@ -61,6 +64,9 @@ impl FitParams {
         for (what, sigma) in [
             ("common_sigma", self.common_sigma),
             ("shift_sigma", self.shift_sigma),
+            ("white noise", self.noise.white),
+            ("wander", self.noise.wander),
+            ("memory", self.noise.memory),
         ] {
             if !(sigma >= 0.0 && sigma.is_finite()) {
                 return Err(FitError::BadSigma { what, sigma });

@@ -21,7 +21,7 @@ const DEBIASINGS: usize = 2;
 /// rejects observations beyond `rejection` scaled standard deviations and takes plain least squares
 /// of the rest, corrected for the bias by curvature. The scale is the median of the normalised
 /// residuals, and never below 1: groups share errors, so residuals may look smaller than the errors
-/// are.
+/// are. No observation is better than the white noise of its session.
 ///
 /// # Errors
 /// [`FitError`]; on NaN, too few observations, and an undetermined needed freedom.
@@ -33,7 +33,15 @@ pub fn fit<M: SurfaceModel>(
     params.check()?;
     guess.check()?;
     Observation::check_all(observations)?;
-    let mut problem = FitProblem::new(observations, guess.axis(), params);
+    let sigma = |o: &Observation| o.sigma.max(params.noise.white);
+    let observations: Vec<_> = observations
+        .iter()
+        .map(|o| Observation {
+            sigma: sigma(o),
+            ..*o
+        })
+        .collect();
+    let mut problem = FitProblem::new(&observations, guess.axis(), params);
     let all = vec![1.0; observations.len()];
     enough::<M>(&problem, &all)?;
     let near = reweighted(&problem, problem.described(guess, &all), huber);

@@ -31,9 +31,10 @@ const RIDGE: f64 = 1e-13;
 /// Observations with their groups, and the unit of lengths while solving.
 pub(super) struct FitProblem<'a> {
     pub observations: &'a [Observation],
-    /// group of each observation, counted from 0
+    /// group of each observation, counted from 0 in the order of `group_numbers`
     pub group: Vec<usize>,
-    pub groups: usize,
+    /// ascending
+    pub group_numbers: Vec<u32>,
     /// root mean square distance of the points from their centre, m: makes all unknowns of order
     /// one
     pub size: f64,
@@ -49,16 +50,16 @@ impl<'a> FitProblem<'a> {
         axis: Vector3<f64>,
         params: &FitParams,
     ) -> Self {
-        let names = distinct(observations.iter().map(|o| o.group));
+        let group_numbers = distinct(observations.iter().map(|o| o.group));
         let group = observations
             .iter()
-            .map(|o| names.partition_point(|&name| name < o.group))
+            .map(|o| group_numbers.partition_point(|&number| number < o.group))
             .collect();
         let (_, size) = centroid_and_spread(observations.iter().map(|o| &o.point));
         Self {
             observations,
             group,
-            groups: names.len(),
+            group_numbers,
             size: if size > 0.0 { size } else { 1.0 },
             known_axis: params.axis_sigma.map(|sigma| (axis, sigma)),
             shift: vec![0.0; observations.len()],
@@ -88,7 +89,7 @@ impl<'a> FitProblem<'a> {
     /// Weights of the squares, 1/m²: the `kept` share (0 to 1) of each observation, over σ² and
     /// over the sum of the shares in its group.
     pub(crate) fn weights(&self, kept: &[f64]) -> Vec<f64> {
-        let mut in_group = vec![0.0; self.groups];
+        let mut in_group = vec![0.0; self.group_numbers.len()];
         self.group
             .iter()
             .zip(kept)

@@ -1,9 +1,9 @@
 //! The covariance of the freedoms of a fitted surface.
 
-use nalgebra::SymmetricEigen;
+use nalgebra::{SMatrix, SymmetricEigen};
 
 use super::solver::{FitProblem, FreedomMatrix};
-use super::{Fit, FitError, FitParams, Freedom, Steps, SurfaceModel};
+use super::{FREEDOMS, Fit, FitError, FitParams, Freedom, Steps, SurfaceModel, TouchNoise};
 
 /// Maximum deviation of a determined direction: the size of the touched area, or 1 rad (both are 1
 /// in scaled steps).
@@ -18,10 +18,10 @@ impl<M: SurfaceModel> Fit<M> {
     /// Covariance around a surface of least squares over the kept observations.
     ///
     /// In steps y of one stated standard deviation along the fixed directions the stated covariance
-    /// is I. The residuals give S = g/(g − k) Σ s sᵀ over the groups, s = Σ wᵢ rᵢ ∂dᵢ/∂y over one
-    /// of them (g groups, k unknowns): the sandwich whose filling is independent of the correlation
-    /// of errors inside a group \[Liang and Zeger 1986\]. Raising the eigenvalues of S below 1 to 1
-    /// keeps the result above both.
+    /// is T = I + W, W of the wander. The residuals give S = g/(g − k) Σ s sᵀ over the groups, s =
+    /// Σ wᵢ rᵢ ∂dᵢ/∂y over one of them (g groups, k unknowns): the sandwich whose filling is
+    /// independent of the correlation of errors inside a group \[Liang and Zeger 1986\]. Raising S
+    /// to T in the directions in which it is smaller keeps the result above both.
     pub(super) fn around(
         problem: &FitProblem,
         surface: M,
@@ -35,57 +35,39 @@ impl<M: SurfaceModel> Fit<M> {
             .column_iter()
             .filter(|c| c.norm_squared() > 0.0)
             .count();
-        let mut scores = vec![Steps::zeros(); problem.groups];
-        let (mut common, mut in_group) = (Steps::zeros(), vec![false; problem.groups]);
-        for (i, &w) in weights.iter().enumerate().filter(|(_, w)| **w > 0.0) {
-            let (_, by) = surface.derivatives(&problem.observations[i].point);
-            let by = scaled.tr_mul(&by.component_mul(&units)) * w;
-            scores[problem.group[i]] += by * problem.residual(&surface, i);
-            common += by;
-            in_group[problem.group[i]] = true;
-        }
-        let groups = in_group.iter().filter(|is| **is).count();
-        let chi_squared = equations.square;
+        let deviations = FreedomMatrix::from_diagonal(&units) * scaled;
+        let sums = GroupSums::of(problem, &surface, &weights, &deviations);
+        let groups = sums.groups;
         let degrees =
             (groups + if problem.known_axis.is_some() { 2 } else { 0 }).saturating_sub(fixed);
-        let spread = (chi_squared / degrees.max(1) as f64).max(1.0);
+        let wander = sums.wander(&problem.group_numbers, &params.noise);
+        let stated = FreedomMatrix::identity() + wander;
         let inner = if groups < fixed + SPARE_GROUPS {
-            FreedomMatrix::identity() * spread
+            let of_wander =
+                params.noise.wander.powi(2) * weights.iter().sum::<f64>() - wander.trace();
+            let expected = (degrees as f64 + of_wander).max(1.0);
+            stated * (equations.square / expected).max(1.0)
         } else {
             let correction = groups as f64 / (groups - fixed) as f64;
             let prior = scaled.tr_mul(&(problem.prior(&surface).information * scaled));
-            let sandwich = scores
+            let sandwich = sums
+                .scores
                 .iter()
                 .fold(prior, |sum, s| sum + s * s.transpose() * correction);
-            at_least_one(sandwich)
+            raised(sandwich, stated)
         };
-        let deviations = FreedomMatrix::from_diagonal(&units) * scaled;
-        let common = deviations * common * params.common_sigma;
-        // a common displacement of observations displaces their surface, whichever part of it they
-        // cover
-        let shift = Steps::from_fn(|i, _| {
-            let is_place = i <= Freedom::Z as usize;
-            if is_place && M::FREE[i] {
-                params.shift_sigma * params.shift_sigma
-            } else {
-                0.0
-            }
-        });
         let own_covariance = deviations * inner * deviations.transpose();
-        let covariance =
-            own_covariance + common * common.transpose() + FreedomMatrix::from_diagonal(&shift);
-        let alone = units.component_mul(&alone);
-        let used: Vec<bool> = kept.iter().map(|k| *k > 0.0).collect();
         Self {
             surface,
-            covariance,
+            covariance: own_covariance
+                + common_covariance::<M>(&(deviations * sums.common), params),
             own_covariance,
-            used,
-            chi_squared,
+            used: kept.iter().map(|k| *k > 0.0).collect(),
+            chi_squared: equations.square,
             degrees,
             groups,
             unknown,
-            alone,
+            alone: units.component_mul(&alone),
             deviations,
         }
     }
@@ -102,6 +84,83 @@ impl<M: SurfaceModel> Fit<M> {
         self.surface.check()?;
         Ok(self)
     }
+}
+
+/// Sums over the kept observations of each group, in steps y.
+struct GroupSums {
+    /// number of groups with kept observations
+    groups: usize,
+    /// Σ wᵢ rᵢ ∂dᵢ/∂y
+    scores: Vec<Steps>,
+    /// Σ wᵢ ∂dᵢ/∂y nᵢᵀ, nᵢ the normal in O
+    turned: Vec<SMatrix<f64, FREEDOMS, 3>>,
+    /// Σ wᵢ ∂dᵢ/∂y over all groups
+    common: Steps,
+}
+
+impl GroupSums {
+    fn of<M: SurfaceModel>(
+        problem: &FitProblem,
+        surface: &M,
+        weights: &[f64],
+        deviations: &FreedomMatrix,
+    ) -> Self {
+        let count = problem.group_numbers.len();
+        let mut is_used = vec![false; count];
+        let mut sums = Self {
+            groups: 0,
+            scores: vec![Steps::zeros(); count],
+            turned: vec![SMatrix::zeros(); count],
+            common: Steps::zeros(),
+        };
+        for (i, &w) in weights.iter().enumerate().filter(|(_, w)| **w > 0.0) {
+            let (point, group) = (&problem.observations[i].point, problem.group[i]);
+            let by = deviations.tr_mul(&surface.derivatives(point).1) * w;
+            sums.scores[group] += by * problem.residual(surface, i);
+            sums.turned[group] += by * surface.distance_and_normal(point).1.transpose();
+            sums.common += by;
+            is_used[group] = true;
+        }
+        sums.groups = is_used.iter().filter(|is| **is).count();
+        sums
+    }
+
+    /// Covariance by the wander: Σ w² exp(−|t − t′|/T) B B′ᵀ over all pairs of groups, B their
+    /// `turned`. As the wander has no memory but its last value, one sum over all earlier groups
+    /// goes along.
+    fn wander(&self, group_numbers: &[u32], noise: &TouchNoise) -> FreedomMatrix {
+        let mut sum = FreedomMatrix::zeros();
+        if noise.wander <= 0.0 {
+            return sum;
+        }
+        let (mut earlier, mut last) = (SMatrix::<f64, FREEDOMS, 3>::zeros(), 0);
+        for (own, &number) in self.turned.iter().zip(group_numbers) {
+            earlier *= (-f64::from(number - last) / noise.memory).exp();
+            let cross = own * earlier.transpose();
+            sum += own * own.transpose() + cross + cross.transpose();
+            earlier += own;
+            last = number;
+        }
+        sum * noise.wander.powi(2)
+    }
+}
+
+/// Covariance by the common errors of all observations.
+///
+/// - `common`: change of the freedoms by an error of 1 of all observations along their normals.
+fn common_covariance<M: SurfaceModel>(common: &Steps, params: &FitParams) -> FreedomMatrix {
+    let common = common * params.common_sigma;
+    // a common displacement of observations displaces their surface, whichever part of it they
+    // cover
+    let shift = Steps::from_fn(|i, _| {
+        let is_place = i <= Freedom::Z as usize;
+        if is_place && M::FREE[i] {
+            params.shift_sigma * params.shift_sigma
+        } else {
+            0.0
+        }
+    });
+    common * common.transpose() + FreedomMatrix::from_diagonal(&shift)
 }
 
 /// In scaled steps: columns of one standard deviation along the fixed directions; and, in steps
@@ -135,9 +194,16 @@ fn directions(information: &FreedomMatrix) -> (FreedomMatrix, FreedomMatrix, Ste
     (fixed, unknown, alone)
 }
 
-/// The matrix with its eigenvalues raised to at least 1.
-fn at_least_one(matrix: FreedomMatrix) -> FreedomMatrix {
-    let mut eigen = SymmetricEigen::new(matrix);
+/// The matrix, raised to at least another, definite one in each direction.
+fn raised(matrix: FreedomMatrix, least: FreedomMatrix) -> FreedomMatrix {
+    // least is I and more
+    let Some(root) = least.cholesky().map(|root| root.unpack()) else {
+        return matrix + least;
+    };
+    let Some(inverse) = root.try_inverse() else {
+        return matrix + least;
+    };
+    let mut eigen = SymmetricEigen::new(inverse * matrix * inverse.transpose());
     eigen.eigenvalues.apply(|x| *x = x.max(1.0));
-    eigen.recompose()
+    root * eigen.recompose() * root.transpose()
 }
