@@ -13,23 +13,11 @@ import trimesh
 from PIL import Image, ImageDraw
 
 from .sheet import SIZE, TOWARDS_EYE, Camera, drawn
-from .touched import into_part
 
 # around the place, mm
 AROUND = 16.0
 WORDS = 34
 MISSED, INVENTED = (200, 30, 30), (120, 0, 160)
-
-
-def in_frame_of_part(mesh, folder, world):
-    """The refined mesh in the frame of the part."""
-    if world == "plain":
-        return mesh
-    origin_and_axes = np.vstack([np.zeros(3), np.eye(3)])
-    as_features = [{"center_mm": point.tolist()} for point in origin_and_axes]
-    moved = np.array([feature["center_mm"] for feature in into_part(as_features, folder, world)])
-    mesh.vertices = mesh.vertices @ (moved[1:] - moved[0]) + moved[0]
-    return mesh
 
 
 def cut_out(mesh, centre):
@@ -51,7 +39,7 @@ def picture(parts, verdict, place, colour):
     centre = np.array(place["center_mm"])
     turn = view_along(place["axis"])
     panels = []
-    meshes = [trimesh.load(folder / "part.stl"), in_frame_of_part(trimesh.load(folder / "refined.ply", process=False), folder, verdict["world"])]
+    meshes = [trimesh.load(folder / "part.stl"), trimesh.load(folder / "refined.ply", process=False)]
     # large faces of the true part reach far beyond the cut
     meshes[0] = meshes[0].subdivide_to_size(4.0)
     for mesh in meshes:

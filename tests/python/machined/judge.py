@@ -58,7 +58,7 @@ def is_of(found, true):
 
 
 def judge(found, part_features, is_required):
-    """The verdict on found features, as dictionaries of the features file in the frame of the part.
+    """The verdict on found features, as dictionaries of the features file.
 
     - is_required: for each true feature whether a program has to find it.
     """

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import trimesh
 from scipy.spatial import cKDTree
-from scipy.spatial.transform import Rotation
 
 from .families import random_part
 from .judge import TOUCHED, Verdict, described, judge
@@ -173,25 +172,6 @@ def refined(touchup, folder, world):
     return json.loads((folder / "features.json").read_text())["features"]
 
 
-def into_part(features, folder, world):
-    """The features in the frame of the part: this removes the error of a world's told place of the scan."""
-    if not world:
-        return features
-    place = json.loads((folder / "truth.json").read_text())["scan_to_space"]
-
-    def pose(of):
-        return Rotation.from_quat(of["orientation_xyzw"]), np.array(of["position_m"]) * 1e3
-
-    (true_turn, true_shift), (told_turn, told_shift) = pose(place["truth"]), pose(place["told"])
-    for feature in features:
-        point = told_turn.apply(feature["center_mm"]) + told_shift
-        feature["center_mm"] = true_turn.inv().apply(point - true_shift).tolist()
-        for name in ("axis", "direction"):
-            if name in feature:
-                feature[name] = true_turn.inv().apply(told_turn.apply(feature[name])).tolist()
-    return features
-
-
 def touched_shares(part, mesh, labels, contacts):
     """For each feature the touched share of its wall."""
     tree = cKDTree(contacts) if len(contacts) else None
@@ -207,7 +187,11 @@ def touched_shares(part, mesh, labels, contacts):
 
 
 def part_run(touchup, out, seed, world, scanner):
-    """The verdict on one part, and the touched shares of its features."""
+    """The verdict on one part, and the touched shares of its features.
+
+    The features are in the frame of the scan. A world's told place of the scan is off, by its stated standard deviation: that is in each
+    centre, as it is in the uncertainty of each centre.
+    """
     family, part = random_part(seed)
     mesh, labels = part.finished()
     folder = out / f"{seed}_{family}_{world or 'plain'}{'_' + scanner if scanner else ''}"
@@ -215,7 +199,7 @@ def part_run(touchup, out, seed, world, scanner):
     mesh.export(folder / "part.stl")
     if not (folder / "truth_contacts.csv").exists():
         simulated(touchup, folder, seed, family, world, scanner)
-    features = into_part(refined(touchup, folder, world), folder, world)
+    features = refined(touchup, folder, world)
     contacts_file = np.loadtxt(folder / "truth_contacts.csv", delimiter=",", skiprows=1, ndmin=2)
     centres, contacts = contacts_file[:, 1:4], contacts_file[:, 4:7]
     radius = np.median(np.linalg.norm(centres - contacts, axis=1))
