@@ -129,6 +129,14 @@ def demand_touched_features(touchup_bin, folder, worlds):
     assert of["missed"] <= 0.03 * of["required"], of
     assert of["false"] <= 0.01 * of["found"], of
     assert of["kind"] <= 0.02 * of["found"], of
+    for world in worlds:
+        places, sizes = [], []
+        for (of, _, number), values in totals.errors.items():
+            if of == world:
+                (places if number == "center_mm" else sizes).extend(error / std for error, std in values if np.isfinite(std))
+        # sizes of few parts may be better than stated: they share one error of the calibration
+        assert 0.8 < np.sqrt(np.mean(np.square(places))) < 1.25, world
+        assert np.sqrt(np.mean(np.square(sizes))) < 1.25, world
 
 
 @pytest.mark.full

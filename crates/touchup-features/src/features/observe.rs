@@ -438,3 +438,40 @@ pub(super) fn groups(touches: &[ProbedPoint]) -> Vec<u32> {
     };
     touches.iter().map(&mut number).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::*;
+
+    /// Stamps in ms and strokes; the third touch begins a group of its own, and the second stroke
+    /// another one within the same tenth of a second.
+    #[test]
+    fn numbers_of_groups_tell_their_time() {
+        let touch = |(ms, stroke): (i64, u32)| ProbedPoint {
+            stamp_ns: 7_000_000_000 + ms * 1_000_000,
+            stroke,
+            centre: Point3::origin(),
+            radius: 1e-3,
+            point: Point3::origin(),
+            normal: Vector3::z(),
+            sigma: 1e-6,
+            calibration: 0.0,
+            place: 0.0,
+            weight: 1.0,
+            is_rejected: false,
+        };
+        let touches = [
+            (0, 0),
+            (99, 0),
+            (100, 0),
+            (5000, 0),
+            (5020, 1),
+            (5119, 1),
+            (4000, 2),
+        ];
+        assert_eq!(groups(&touches.map(touch)), [0, 0, 1, 50, 51, 51, 52]);
+        assert!(groups(&[]).is_empty());
+    }
+}

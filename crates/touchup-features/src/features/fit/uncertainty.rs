@@ -196,11 +196,8 @@ fn directions(information: &FreedomMatrix) -> (FreedomMatrix, FreedomMatrix, Ste
 
 /// The matrix, raised to at least another, definite one in each direction.
 fn raised(matrix: FreedomMatrix, least: FreedomMatrix) -> FreedomMatrix {
-    // least is I and more
-    let Some(root) = least.cholesky().map(|root| root.unpack()) else {
-        return matrix + least;
-    };
-    let Some(inverse) = root.try_inverse() else {
+    let root = least.cholesky().map(|root| root.unpack());
+    let Some((root, inverse)) = root.and_then(|root| Some((root, root.try_inverse()?))) else {
         return matrix + least;
     };
     let mut eigen = SymmetricEigen::new(inverse * matrix * inverse.transpose());
