@@ -173,15 +173,9 @@ impl<'a> SegmentTouches<'a> {
         numbers.iter().map(observation).collect()
     }
 
-    /// Parameters of a fit to touches, without a prior axis.
+    /// As [`fit_params`].
     pub(crate) fn fit_params(&self, numbers: &[u32]) -> FitParams {
-        let [common_sigma, shift_sigma] = self.systematic(numbers);
-        FitParams {
-            common_sigma,
-            shift_sigma,
-            noise: self.noise,
-            ..FitParams::default()
-        }
+        fit_params(self.systematic(numbers), self.noise)
     }
 
     /// Standard deviations that do not average out, m: common error of all touches along their
@@ -359,6 +353,19 @@ pub(super) fn observation(touch: &ProbedPoint, group: u32) -> Observation {
         offset: radius,
         sigma,
         group,
+    }
+}
+
+/// Parameters of a fit to touches, without a prior axis.
+///
+/// - `systematic`: as of [`SegmentTouches::systematic`].
+pub(super) fn fit_params(systematic: [f64; 2], noise: TouchNoise) -> FitParams {
+    let [common_sigma, shift_sigma] = systematic;
+    FitParams {
+        common_sigma,
+        shift_sigma,
+        noise,
+        ..FitParams::default()
     }
 }
 

@@ -10,7 +10,7 @@ use super::detect::{Detection, detect};
 use super::feature::{Feature, FeatureKind, FittedTo, MeasuredValue, Walls};
 use super::fit::{Cylinder, Fit, FitParams, Freedom, Stadium, SurfaceModel, TouchNoise, fit};
 use super::from_fits::{Touches, axis_of, number};
-use super::observe::{groups, observation, systematic};
+use super::observe::{fit_params, groups, observation, systematic};
 use touchup_geometry::mesh::TriMesh;
 use touchup_geometry::numeric::distinct;
 use touchup_method::stylus::ProbedPoint;
@@ -205,14 +205,9 @@ impl Feature {
             .zip(groups(&chosen))
             .map(|(touch, group)| observation(touch, group))
             .collect();
-        let [common_sigma, shift_sigma] = systematic(chosen.iter());
-        let axis_sigma = Some(AXIS_KNOWN);
         let params = FitParams {
-            common_sigma,
-            shift_sigma,
-            axis_sigma,
-            noise,
-            ..FitParams::default()
+            axis_sigma: Some(AXIS_KNOWN),
+            ..fit_params(systematic(chosen.iter()), noise)
         };
         let is_held = match &self.walls {
             Some(Walls::Round(cylinder)) => fit(cylinder, &observations, &params)

@@ -33,14 +33,11 @@ pub fn fit<M: SurfaceModel>(
     params.check()?;
     guess.check()?;
     Observation::check_all(observations)?;
-    let sigma = |o: &Observation| o.sigma.max(params.noise.white);
-    let observations: Vec<_> = observations
-        .iter()
-        .map(|o| Observation {
-            sigma: sigma(o),
-            ..*o
-        })
-        .collect();
+    let with_white = |o: &Observation| Observation {
+        sigma: o.sigma.max(params.noise.white),
+        ..*o
+    };
+    let observations: Vec<_> = observations.iter().map(with_white).collect();
     let mut problem = FitProblem::new(&observations, guess.axis(), params);
     let all = vec![1.0; observations.len()];
     enough::<M>(&problem, &all)?;
