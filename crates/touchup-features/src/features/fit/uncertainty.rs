@@ -36,7 +36,7 @@ impl<M: SurfaceModel> Fit<M> {
             .filter(|c| c.norm_squared() > 0.0)
             .count();
         let deviations = FreedomMatrix::from_diagonal(&units) * scaled;
-        let sums = GroupSums::of(problem, &surface, &weights, &deviations);
+        let sums = GroupSums::of(problem, &surface, &weights, &deviations, &params.noise);
         let groups = sums.groups;
         let degrees =
             (groups + if problem.known_axis.is_some() { 2 } else { 0 }).saturating_sub(fixed);
@@ -92,7 +92,7 @@ struct GroupSums {
     groups: usize,
     /// Σ wᵢ rᵢ ∂dᵢ/∂y
     scores: Vec<Steps>,
-    /// Σ wᵢ ∂dᵢ/∂y nᵢᵀ, nᵢ the normal in O
+    /// Σ wᵢ ∂dᵢ/∂y nᵢᵀ, nᵢ the normal in O; only with a wander
     turned: Vec<SMatrix<f64, FREEDOMS, 3>>,
     /// Σ wᵢ ∂dᵢ/∂y over all groups
     common: Steps,
@@ -104,6 +104,7 @@ impl GroupSums {
         surface: &M,
         weights: &[f64],
         deviations: &FreedomMatrix,
+        noise: &TouchNoise,
     ) -> Self {
         let count = problem.group_numbers.len();
         let mut is_used = vec![false; count];
@@ -117,7 +118,9 @@ impl GroupSums {
             let (point, group) = (&problem.observations[i].point, problem.group[i]);
             let by = deviations.tr_mul(&surface.derivatives(point).1) * w;
             sums.scores[group] += by * problem.residual(surface, i);
-            sums.turned[group] += by * surface.distance_and_normal(point).1.transpose();
+            if noise.wander > 0.0 {
+                sums.turned[group] += by * surface.distance_and_normal(point).1.transpose();
+            }
             sums.common += by;
             is_used[group] = true;
         }
@@ -135,7 +138,7 @@ impl GroupSums {
         }
         let (mut earlier, mut last) = (SMatrix::<f64, FREEDOMS, 3>::zeros(), 0);
         for (own, &number) in self.turned.iter().zip(group_numbers) {
-            earlier *= (-f64::from(number - last) / noise.memory).exp();
+            earlier *= (-f64::from(number - last) / noise.memory.max(f64::MIN_POSITIVE)).exp();
             let cross = own * earlier.transpose();
             sum += own * own.transpose() + cross + cross.transpose();
             earlier += own;
