@@ -104,7 +104,8 @@ impl<'a> SegmentTouches<'a> {
             let (distance, normal) = primitive.distance_and_normal(&touch.centre);
             let visit = Visit {
                 group: self.group[number as usize],
-                point: touch.point,
+                // its error must not choose its place
+                point: touch.centre - normal * distance,
                 residual: distance - touch.radius,
             };
             (normal.dot(&touch.normal) > ON_FACE).then_some(visit)

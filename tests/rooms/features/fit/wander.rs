@@ -19,7 +19,7 @@ const WHITE: f64 = 0.02 * MM;
 const WANDER: f64 = 0.08 * MM;
 const BALL: f64 = 1.5 * MM;
 const RADIUS: f64 = 5.0 * MM;
-const SLOT: [f64; 2] = [8.0 * MM, 20.0 * MM];
+const SLOT: [f64; 2] = [8.0 * MM, 12.0 * MM];
 const SEEDS: u64 = 120;
 
 /// Place of a ball in a hole about z, from the share of its helix.
@@ -135,13 +135,17 @@ fn stated_holds<S: SurfaceModel>(
 }
 
 #[test]
-fn place_of_a_hole_holds_for_few_passes_with_a_wander() {
+fn place_and_radius_of_a_hole_hold_for_few_passes_with_a_wander() {
     let guess = hole_near(&Isometry3::identity(), RADIUS);
     stated_holds("hole", &guess, in_hole, |hole| {
         // at the height of the origin of F
         let center = Vector3::new(hole.center().x, hole.center().y, 0.0);
         let off = hole.pose_of.inverse_transform_vector(&center);
-        vec![(Freedom::X, off.x), (Freedom::Y, off.y)]
+        vec![
+            (Freedom::X, off.x),
+            (Freedom::Y, off.y),
+            (Freedom::Size, hole.radius - RADIUS),
+        ]
     });
 }
 
@@ -157,7 +161,7 @@ fn place_of_a_plane_holds_for_few_passes_with_a_wander() {
 }
 
 #[test]
-fn place_of_a_slot_holds_for_few_passes_with_a_wander() {
+fn place_and_sizes_of_a_slot_hold_for_few_passes_with_a_wander() {
     let guess = Stadium::new(
         Point3::new(0.2, -0.1, 0.0) * MM,
         &Vector3::new(0.01, -0.01, 1.0),
@@ -167,17 +171,23 @@ fn place_of_a_slot_holds_for_few_passes_with_a_wander() {
         true,
     );
     stated_holds("slot", &guess, in_slot, |slot| {
-        vec![(Freedom::X, slot.center().x), (Freedom::Y, slot.center().y)]
+        vec![
+            (Freedom::X, slot.center().x),
+            (Freedom::Y, slot.center().y),
+            (Freedom::Size, slot.width - SLOT[0]),
+            (Freedom::Second, slot.length - SLOT[1]),
+        ]
     });
 }
 
-/// Lines over a plate along x and then along y, 2 mm apart and 0.1 s for 2 mm, by a stylus that
-/// wanders: each place is touched by two lines, and by the neighbours of both.
+/// Lines over a plate along x and then along y, 0.7 mm apart and 0.1 s for 0.7 mm, by a stylus that
+/// wanders: a place as wide as the ball's radius has steps of one line, neighbouring lines, and both
+/// directions.
 fn lines_over_a_plate(rng: &mut Pcg64, noise: &TouchNoise) -> Vec<ProbedPoint> {
     const LINE: i64 = 20;
     let mut wander = shaken(rng, noise.wander);
     let mut touches = Vec::new();
-    let at = |step: i64| (step as f64 - 9.5) * 2.0 * MM;
+    let at = |step: i64| (step as f64 - 9.5) * 0.7 * MM;
     for line in 0..2 * LINE {
         for step in 0..LINE {
             let keep = if step == 0 { 6.0 } else { 1.0 };
@@ -204,8 +214,9 @@ fn lines_over_a_plate(rng: &mut Pcg64, noise: &TouchNoise) -> Vec<ProbedPoint> {
     touches
 }
 
-/// Mean squares over twelve plates of 100 s, some thirty correlation times each: within 20 % in
-/// their root.
+/// Twelve plates of 100 s, some thirty correlation times each. Of such dozens the root mean square of
+/// the white noise scatters by a tenth, of the wander by less, and the mean correlation time by a
+/// fifth.
 #[test]
 fn repeated_visits_show_the_noise_of_a_session() {
     let noise = TouchNoise {
@@ -225,11 +236,11 @@ fn repeated_visits_show_the_noise_of_a_session() {
         .collect();
     println!("{found:?}");
     let of = |number: fn(&TouchNoise) -> f64| rms(&found.iter().map(number).collect::<Vec<_>>());
-    for (name, ratio) in [
-        ("white", of(|noise| noise.white) / noise.white),
-        ("wander", of(|noise| noise.wander) / noise.wander),
+    for (name, ratio, off) in [
+        ("white", of(|noise| noise.white) / noise.white, 0.3),
+        ("wander", of(|noise| noise.wander) / noise.wander, 0.2),
     ] {
-        assert!((0.8..1.2).contains(&ratio), "{name}: {ratio}");
+        assert!((ratio - 1.0).abs() < off, "{name}: {ratio}");
     }
     let memory = found.iter().map(|noise| noise.memory.ln()).sum::<f64>() / 12.0;
     assert!((memory.exp() / noise.memory).ln().abs() < 0.5, "{memory}");
