@@ -29,6 +29,8 @@ pub(super) struct FeatureProbing<'p, 'a> {
     pub entry: Option<Point3<f64>>,
     /// start of the last search, m in O; `None` if the ball was not there yet
     pub from: Option<Point3<f64>>,
+    /// whether the last touch ended away from its contact
+    pub is_away: bool,
     /// whether the zero of the sensor is from this feature
     pub is_zeroed: bool,
     /// stamp of the zero by the arm's clock, ns
@@ -178,6 +180,7 @@ impl<'p, 'a> FeatureProbing<'p, 'a> {
             is_out: true,
             entry: None,
             from: None,
+            is_away: false,
             is_zeroed: false,
             zeroed_ns: state.stamp_ns,
             begun_ns: state.stamp_ns,
@@ -372,6 +375,7 @@ impl FeatureProbing<'_, '_> {
         &mut self,
         planned: &TouchPlan,
     ) -> Result<(TouchResult, ProbedTouch), Ending> {
+        let is_away = std::mem::take(&mut self.is_away);
         self.prober
             .space()
             .may_touch(&self.rotation, planned, &self.out.joints)?;
@@ -379,7 +383,6 @@ impl FeatureProbing<'_, '_> {
         let is_near = self
             .from
             .is_some_and(|from| (from - planned.from).norm() < near);
-        let is_away = self.touches.last().is_none_or(ends_away);
         // otherwise it stays inside the feature
         if !is_near || !is_away || planned.from == planned.entry {
             self.reach(&planned.entry)?;
@@ -437,6 +440,7 @@ impl FeatureProbing<'_, '_> {
             self.from = Some(planned.from);
         }
         let (result, touch) = self.probed_touch(*planned, touched?);
+        self.is_away = ends_away(&touch);
         let deviation = touch
             .centre
             .and_then(|centre| deviation(&before, planned, &centre));

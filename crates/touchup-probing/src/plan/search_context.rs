@@ -143,6 +143,24 @@ impl TouchPlan {
     pub fn end(&self) -> Point3<f64> {
         self.from + self.direction.into_inner() * self.search
     }
+
+    /// The same search, begun farther along its direction.
+    ///
+    /// - `by`: m
+    pub(crate) fn begun_ahead(&self, by: f64) -> Self {
+        let ahead = self.direction.into_inner() * by;
+        let expected = self.expected.map(|expected| ExpectedTravel {
+            travel: expected.travel - by,
+            ..expected
+        });
+        Self {
+            entry: self.entry + ahead,
+            from: self.from + ahead,
+            search: self.search - by,
+            expected,
+            ..*self
+        }
+    }
 }
 
 /// Expected distance of the surface from the start of a search.

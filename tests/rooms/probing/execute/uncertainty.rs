@@ -13,7 +13,7 @@ use touchup::probing::execute::{
     Ending, Flag, ProbeParams, Prober, Progress, StaticWorld, World as ProbedWorld,
 };
 use touchup::probing::plan::{ArmUncertainty, PatternParams};
-use touchup::sim::{ArmErrorSigmas, ArmErrors, ArmParams, Plate, SimArm};
+use touchup::sim::{ArmErrorSigmas, ArmErrors, ArmFault, ArmParams, Plate, SimArm};
 
 use super::{cell, params};
 use crate::plate_stream::plate_scan;
@@ -40,6 +40,18 @@ const ROUGH: ArmErrorSigmas = ArmErrorSigmas {
     lengths: 0.0,
     repeatability: 50e-6,
     play: 0.0,
+};
+const ROUGH_ARM: World = World {
+    name: "rough",
+    sigmas: ROUGH,
+    wanted: 0.25e-3,
+    turns: true,
+};
+const CALIBRATED_ARM: World = World {
+    name: "calibrated",
+    sigmas: ArmErrorSigmas::CALIBRATED,
+    wanted: 25e-6,
+    turns: false,
 };
 /// The middle of the plate.
 const ABOUT: Point3<f64> = Point3::new(30e-3, 25e-3, 12e-3);
@@ -163,7 +175,15 @@ fn told(world: &World) -> ProbeParams {
 }
 
 /// Probes a feature of the plate with an arm that differs from its scene.
-fn probed(drawn: &Drawn, seed: u64, scan: &TriMesh, world: &World) -> Result<Normalised, String> {
+///
+/// - `fault`: and the number of contacts before it.
+fn probed(
+    drawn: &Drawn,
+    seed: u64,
+    scan: &TriMesh,
+    world: &World,
+    fault: Option<(usize, ArmFault)>,
+) -> Result<Normalised, String> {
     let (plate, cell, params) = (Plate::default(), cell(), told(world));
     let errors = ArmErrors::draw(&world.sigmas, ABOUT, seed);
     let mut rng = Pcg64::seed_from_u64(seed);
@@ -198,6 +218,9 @@ fn probed(drawn: &Drawn, seed: u64, scan: &TriMesh, world: &World) -> Result<Nor
         &start,
     )
     .unwrap();
+    if let Some((contacts, fault)) = fault {
+        arm.fail_after_contacts(contacts, fault);
+    }
     let mut world = StaticWorld::new(scan.clone());
     let probed = Prober::new(&mut arm, &cell, &params, &mut world).probe(&flag);
     match probed.found.and_then(|found| found.feature) {
@@ -216,6 +239,31 @@ fn probed(drawn: &Drawn, seed: u64, scan: &TriMesh, world: &World) -> Result<Nor
     }
 }
 
+/// Arms with a first contact, or a wall behind its search, within their error of the stand-off; at
+/// seed 1087 two touches from 0.7 mm had one error. Each ended as a bent probe; one that bends by
+/// 1 mm still gets no numbers.
+#[test]
+fn a_sound_arm_is_not_accused_of_a_bent_probe() {
+    let scan = plate_scan(1);
+    let bent = ArmFault::TipBent(Vector3::new(0.7e-3, 0.7e-3, 0.0));
+    for (name, seed, world) in [
+        ("slot", 1087, ROUGH_ARM),
+        ("boss", 2014, ROUGH_ARM),
+        ("boss", 2084, ROUGH_ARM),
+        ("boss", 7193, CALIBRATED_ARM),
+        ("slot", 6089, CALIBRATED_ARM),
+        ("slot", 6149, CALIBRATED_ARM),
+    ] {
+        let drawn = DRAWN.iter().find(|drawn| drawn.name == name).unwrap();
+        if let Err(why) = probed(drawn, seed, &scan, &world, None) {
+            panic!("{why}");
+        }
+        let found = probed(drawn, seed, &scan, &world, Some((16, bent)));
+        println!("{name} with seed {seed}, bent: {found:?}");
+        assert!(found.is_err(), "{name} with seed {seed}: {found:?}");
+    }
+}
+
 fn rms(errors: &[f64]) -> f64 {
     (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt()
 }
@@ -224,26 +272,14 @@ fn rms(errors: &[f64]) -> f64 {
 #[test]
 #[ignore = "a slow proof"]
 fn errors_are_as_large_as_stated_of_a_rough_arm() {
-    let world = World {
-        name: "rough",
-        sigmas: ROUGH,
-        wanted: 0.25e-3,
-        turns: true,
-    };
-    errors_are_as_large_as_stated(&world, 0);
+    errors_are_as_large_as_stated(&ROUGH_ARM, 0);
 }
 
 /// Sizes deviate by the scatter of touches.
 #[test]
 #[ignore = "a slow proof"]
 fn errors_are_as_large_as_stated_of_a_calibrated_arm() {
-    let world = World {
-        name: "calibrated",
-        sigmas: ArmErrorSigmas::CALIBRATED,
-        wanted: 25e-6,
-        turns: false,
-    };
-    errors_are_as_large_as_stated(&world, 5000);
+    errors_are_as_large_as_stated(&CALIBRATED_ARM, 5000);
 }
 
 /// Of 200 errors the rms over their deviation is within the bounds for 50, 0.8 to 1.25: of 50 that
@@ -258,7 +294,7 @@ fn errors_are_as_large_as_stated(world: &World, first: u64) {
     let mut wrong = Vec::new();
     for (drawn, apart) in DRAWN.iter().zip((first..).step_by(1000)) {
         let results: Vec<_> = (1..=seeds)
-            .map(|seed| probed(drawn, apart + seed, &scan, world))
+            .map(|seed| probed(drawn, apart + seed, &scan, world, None))
             .collect();
         let found: Vec<&Normalised> = results
             .iter()
