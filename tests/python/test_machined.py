@@ -20,7 +20,7 @@ from machined.judge import KINDS, described, judge
 from machined.touched import FOREIGN, WORLDS, Totals, part_run
 from scipy.spatial.transform import Rotation
 
-# development looked at none of these seeds
+# development looked at none of these drawings; on the touched parts it judged its uncertainties
 SEEDS = range(1000, 1060 if IS_FULL else 1018)
 TOUCHED_SEEDS = range(2000, 2008)
 # least found share of the features of a drawing: holes across shafts of long and thin tessellation fail now and then
@@ -131,8 +131,8 @@ def demand_touched_features(touchup_bin, folder, worlds):
     assert of["kind"] <= 0.02 * of["found"], of
     for world in worlds:
         places, sizes = [], []
-        for (of, _, number), values in totals.errors.items():
-            if of == world:
+        for (where, _, number), values in totals.errors.items():
+            if where == world:
                 (places if number == "center_mm" else sizes).extend(error / std for error, std in values if np.isfinite(std))
         # sizes of few parts may be better than stated: they share one error of the calibration
         assert 0.8 < np.sqrt(np.mean(np.square(places))) < 1.25, world

@@ -272,7 +272,9 @@ def test_pages_have_the_nodes_mesh_however_late_they_join_and_one_that_takes_not
         with Socket(node.url) as late:
             late.take_until(lambda: late.version >= saved["mesh_version"])
             assert (late.faces, late.vertices) == (early.faces, early.vertices)
-        assert early.newest["features"]["features"] and early.newest["tip"]["markers"]
+        # features are recognised after the mesh rests
+        early.take_until(lambda: early.newest["features"]["features"])
+        assert early.newest["tip"]["markers"]
         mesh = trimesh.load(node.session / "saved.ply", process=False)
         assert len(early.faces) == len(mesh.faces) == saved["face_count"]
         corners = numpy.array([[early.vertices[vertex] for vertex in face] for face in early.faces.values()])

@@ -33,6 +33,9 @@ pub(super) struct SegmentTouches<'a> {
 /// Touches of one stroke within this time share their error: the smoothing window, and half of it
 /// again.
 const SHARED_NS: i64 = 100_000_000;
+/// Maximum step between the numbers of two groups: 7 min, beyond each wander, so that a clock that
+/// jumps by years leaves numbers for all groups.
+const FARTHEST: i64 = 4096;
 /// Share of the common errors of touches on one plane that those of another do not have: poses
 /// wander slowly, and the stylus leans otherwise.
 pub(super) const NOT_ALIKE: f64 = 0.33;
@@ -427,19 +430,27 @@ fn is_on_chord(
 /// Numbers of the groups of touches that share their error, by their time: they ascend, by one in
 /// [`SHARED_NS`] or, for a new stroke, earlier.
 pub(super) fn groups(touches: &[ProbedPoint]) -> Vec<u32> {
-    let first = touches.first().map_or(0, |touch| touch.stamp_ns);
+    // stamp of group 0
+    let mut origin = touches.first().map_or(0, |touch| touch.stamp_ns);
     // stroke, begin and number of the last group
     let mut last: Option<(u32, i64, u32)> = None;
     let mut number = |touch: &ProbedPoint| match last {
         Some((stroke, begun, group))
-            if touch.stroke == stroke && touch.stamp_ns.saturating_sub(begun) < SHARED_NS =>
+            if touch.stroke == stroke
+                && (-SHARED_NS..SHARED_NS).contains(&touch.stamp_ns.saturating_sub(begun)) =>
         {
             group
         }
         before => {
-            let by_time = touch.stamp_ns.saturating_sub(first).max(0) / SHARED_NS;
-            let next = before.map_or(0, |(.., group)| group.saturating_add(1));
-            let group = next.max(u32::try_from(by_time).unwrap_or(u32::MAX));
+            let next = before.map_or(0, |(.., group)| i64::from(group) + 1);
+            let by_time = touch.stamp_ns.saturating_sub(origin) / SHARED_NS;
+            let group = by_time.clamp(next, next + FARTHEST);
+            let is_back = before.is_some_and(|(_, begun, _)| touch.stamp_ns < begun);
+            if is_back || by_time > group {
+                // another clock
+                origin = touch.stamp_ns.saturating_sub(group * SHARED_NS);
+            }
+            let group = u32::try_from(group).unwrap_or(u32::MAX);
             last = Some((touch.stroke, touch.stamp_ns, group));
             group
         }
@@ -478,8 +489,14 @@ mod tests {
             (5020, 1),
             (5119, 1),
             (4000, 2),
+            // the clock went back, and goes on from there
+            (4600, 2),
+            // twenty years
+            (630_000_000_000, 2),
+            (630_000_001_000, 2),
         ];
-        assert_eq!(groups(&touches.map(touch)), [0, 0, 1, 50, 51, 51, 52]);
+        let numbers = [0, 0, 1, 50, 51, 51, 52, 58, 4155, 4165];
+        assert_eq!(groups(&touches.map(touch)), numbers);
         assert!(groups(&[]).is_empty());
     }
 }

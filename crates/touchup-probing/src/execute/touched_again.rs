@@ -99,8 +99,13 @@ impl FeatureProbing<'_, '_> {
                 Ok((TouchResult::Nothing, _)) => {
                     format!("is not met within {:.1} mm", planned.search * 1e3)
                 }
+                // the first path was free, another one need not be
+                Err(ending) if ending.is_of_one() && !others.is_empty() => {
+                    *plans = others;
+                    continue;
+                }
                 Err(Ending::Stopped(ProbeError::Obstacle { .. })) => {
-                    "is met before its stand-off".to_owned()
+                    return Err(self.displaced(reference, "is met before its stand-off".to_owned()));
                 }
                 Err(ending) => return Err(ending),
             };

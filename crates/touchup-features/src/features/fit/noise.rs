@@ -223,7 +223,7 @@ mod tests {
         let visit = |group: u32, x: f64| Visit {
             group,
             point: Point3::new(x, 0.5, 0.5),
-            residual: 0.0,
+            residual: f64::from(group * 7 % 5) * 1e-5,
         };
         let mut classes = vec![LagClass::default(); CLASSES];
         let before = [visit(3, 0.1), visit(5, 0.2), visit(9, 0.3)];
@@ -241,5 +241,10 @@ mod tests {
             TouchNoise::default()
         );
         assert_eq!(TouchNoise::of(alone, 1.0), TouchNoise::default());
+        let again = (0..40).map(|at| visit(at, 0.5));
+        assert_ne!(
+            TouchNoise::of([again.collect()], 1.0),
+            TouchNoise::default()
+        );
     }
 }
