@@ -86,7 +86,7 @@ impl FeatureProbing<'_, '_> {
     /// - `plans`: for this touch and later ones; a plan that does not meet the contact is dropped.
     ///
     /// # Errors
-    /// [`ProbeError::Displaced`] after the last plan.
+    /// [`ProbeError::Displaced`] after the last plan, and at once after an obstacle on a fast link.
     fn look_at(
         &mut self,
         reference: &ReferenceContact,

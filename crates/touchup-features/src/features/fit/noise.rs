@@ -28,7 +28,7 @@ const MOST_PAIRS: f64 = 300.0;
 /// Minimum number of classes for the three unknowns.
 const LEAST_CLASSES: usize = 4;
 /// Number of correlation times to try, from one group to the longest time between visits: a step
-/// of a third at most.
+/// of a third at most if that is below 12 min.
 const MEMORIES: u32 = 32;
 /// Number of solutions with weights of the one before: the weights have settled within a few
 /// percent.

@@ -92,7 +92,7 @@ struct GroupSums {
     groups: usize,
     /// Σ wᵢ rᵢ ∂dᵢ/∂y
     scores: Vec<Steps>,
-    /// Σ wᵢ ∂dᵢ/∂y nᵢᵀ, nᵢ the normal in O; only with a wander
+    /// Σ wᵢ ∂dᵢ/∂y nᵢᵀ, nᵢ the normal in O; 0 without a wander
     turned: Vec<SMatrix<f64, FREEDOMS, 3>>,
     /// Σ wᵢ ∂dᵢ/∂y over all groups
     common: Steps,
