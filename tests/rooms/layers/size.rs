@@ -9,7 +9,7 @@ use std::path::Path;
 /// Functions of more than 60 lines of code, in all compiled files: tests, benches, examples and
 /// fuzz targets too.
 const LONG_FUNCTIONS: Bound = Bound {
-    today: 96,
+    today: 95,
     wanted: 0,
 };
 

@@ -99,7 +99,7 @@ fn cone_beyond(parted: &SegmentedMesh, wall: &Wall, end: f64, out: f64) -> Optio
             area,
             tolerance,
             is_exact,
-            felt_turn: 0.0,
+            felt: Vec::new(),
         })
     })
 }

@@ -3,9 +3,6 @@
 use nalgebra::{Matrix3, Point3, Vector3};
 
 use super::borders::{Borders, StraightEdge, borders, straight_edges, without_seams};
-use super::by_contacts::contact_heads::{Counterbore, head_of};
-use super::by_contacts::contact_slots::contact_slots;
-use super::by_contacts::contact_walls::add_contact_walls;
 use super::cones::add_cones;
 use super::feature::{Feature, FeatureKind, FittedTo, Form, MeasuredValue, Walls};
 use super::fit::{Fit, Freedom, Plane, Stadium, SurfaceModel, TouchNoise};
@@ -15,7 +12,8 @@ use super::observe::{NOT_ALIKE, SegmentTouches};
 use super::rims::{OpeningOutline, RoundOpening, outlines, rims};
 use super::segmentation::scene::{SegmentedMesh, numbered_by_place};
 use super::shafts::is_shaft;
-use super::slots::{Slot, slots};
+use super::surfaces::{claim, touched_surfaces};
+use super::voids::{Slot, voids};
 use super::walls::{ALL_AROUND, SAME_WALL, Wall};
 use touchup_geometry::mesh::{FaceTree, TriMesh};
 use touchup_geometry::numeric::distinct;
@@ -37,6 +35,10 @@ const SURE_WIDTH: f64 = 25.0;
 
 /// Diameter of the ball's own path in the coarse mesh, in diameters of the ball.
 const OF_BALL: std::ops::Range<f64> = 0.97..1.12;
+/// Maximum distance of a ball's centre from the axis of its path, in diameters, and minimum number of
+/// touches there.
+const IN_PATH: f64 = 0.2;
+const LEAST_IN_PATH: usize = 3;
 
 /// Detects the features of a mesh, measured by touches if there are any. With touches the same
 /// surface gives the same features for any numbering of vertices and faces: live and saved meshes
@@ -49,18 +51,16 @@ pub fn detect(mesh: &TriMesh, touches: &[ProbedPoint]) -> Detection {
     let tree = FaceTree::new(mesh);
     let mut parted = SegmentedMesh::of(mesh, &tree);
     join_planes(&mut parted);
-    let is_round = add_contact_walls(&mut parted, touches);
+    let radius = touches.iter().map(|touch| touch.radius).fold(0.0, f64::max);
+    claim(&mut parted, &touched_surfaces(touches), radius);
     // contact walls took faces from planes of the mesh; equal planes join again
     join_planes(&mut parted);
     let mut walls = Wall::all(&parted.facets, &parted.segmentation);
     add_cones(&mut parted, &mut walls);
     let of_face = without_seams(&parted);
     let borders = borders(&parted, &of_face);
-    let (slots, pockets) = with_felt(
-        contact_slots(&parted, touches, &is_round),
-        slots(&parted, &walls, &of_face, &borders),
-    );
-    let (holes, slots) = without_ends(holes(&parted, &walls), slots, &walls);
+    let (slots, pockets) = voids(&parted, &walls, &of_face, radius);
+    let (holes, slots) = without_ends(holes(&parted, &walls, touches), slots, &walls);
     let edges = sure_edges(&parted, &borders);
     let observed = SegmentTouches::of(&parted, &of_face, touches);
     let measure = Measure::new(&observed);
@@ -76,7 +76,7 @@ pub fn detect(mesh: &TriMesh, touches: &[ProbedPoint]) -> Detection {
         .into_iter()
         .partition(|feature| feature.kind == FeatureKind::Boss);
     features.extend(cut);
-    let mut features = with_heads(&measure, without_second_walls(features));
+    let mut features = without_second_walls(features);
     features.extend(slot_features(&measure, &slots, &pockets));
     let raised = bosses
         .iter()
@@ -173,19 +173,26 @@ fn hole_features(
     holes: &[Hole],
     touches: &[ProbedPoint],
 ) -> Vec<Feature> {
-    // an untouched wall of the ball's own width is the path of the ball through an unscanned region
     let of_ball = touches
         .iter()
         .map(|touch| 2.0 * touch.radius)
         .fold(0.0, f64::max);
+    // a ball in it that touched something else: its path through an unscanned region
     let is_way_of_ball = |feature: &Feature| {
-        let width = feature
-            .diameter
-            .as_ref()
-            .map_or(0.0, |diameter| diameter.value);
+        let (Some(diameter), Some(axis), Some(depth)) =
+            (&feature.diameter, &feature.axis, &feature.depth)
+        else {
+            return false;
+        };
+        let is_inside = |touch: &&ProbedPoint| {
+            let v = touch.centre - feature.centre.value;
+            let along = v.dot(&axis.value);
+            (-depth.value..0.0).contains(&along)
+                && (v - axis.value * along).norm() < IN_PATH * diameter.value
+        };
+        let is_of_ball = OF_BALL.contains(&(diameter.value / of_ball));
         feature.fitted_to == FittedTo::Mesh
-            && feature.touched == 0.0
-            && OF_BALL.contains(&(width / of_ball))
+            && (is_of_ball || touches.iter().filter(is_inside).count() >= LEAST_IN_PATH)
     };
     let mut features = Vec::new();
     for (hole, group) in holes.iter().zip(groups(walls, holes)) {
@@ -252,64 +259,6 @@ fn join_planes(parted: &mut SegmentedMesh) {
         .join_planes(&parted.facets, beside.into_iter());
 }
 
-/// Adds the heads of holes that contacts alone show; hole and head form one group.
-fn with_heads(measure: &Measure, mut features: Vec<Feature>) -> Vec<Feature> {
-    for at in 0..features.len() {
-        let Some(head) = head_of(measure, &features[at]) else {
-            continue;
-        };
-        let head = head_feature(measure, &head);
-        if features.iter().any(|known| is_same_head(known, &head)) {
-            continue;
-        }
-        let group = features[at].group.unwrap_or(features.len() as u32);
-        features[at].group = Some(group);
-        features.push(Feature {
-            group: Some(group),
-            ..head
-        });
-    }
-    features
-}
-
-/// Whether a known feature is the same hole as a head.
-fn is_same_head(known: &Feature, head: &Feature) -> bool {
-    let wide = |feature: &Feature| {
-        feature
-            .diameter
-            .as_ref()
-            .map_or(0.0, |diameter| diameter.value)
-    };
-    let near = 0.5 * wide(head);
-    let is_near = (known.centre.value - head.centre.value).norm() < near;
-    known.kind == FeatureKind::Hole
-        && is_near
-        && (wide(known) - wide(head)).abs() < ONE_WALL * wide(head)
-}
-
-fn head_feature(measure: &Measure, head: &Counterbore) -> Feature {
-    let axis = head.wall.axis(&head.out);
-    let on_axis = head.wall.surface.center();
-    let opening = AxisEnd::on(measure, Some(head.land), &on_axis, &axis.value);
-    let bottom = opening.place.value - axis.value * head.depth;
-    let floor = measure.felt_plane(&head.floor, &bottom, &axis.value);
-    let floor = floor.map_or_else(
-        || AxisEnd::unknown(&bottom),
-        |floor| AxisEnd::met(measure, &floor, &bottom, &axis.value),
-    );
-    let centre = opening.centre(&head.wall, |fit| fit.lateral_std(&opening.place.value));
-    Feature {
-        diameter: Some(
-            head.wall
-                .number(2.0 * head.wall.surface.radius, &[(Freedom::Size, 2.0)]),
-        ),
-        depth: Some(between(&opening, &floor, &axis.value)),
-        axis: Some(axis),
-        walls: Some(Walls::Round(head.wall.surface)),
-        ..Feature::new(FeatureKind::Hole, centre, 1.0, FittedTo::Touches)
-    }
-}
-
 /// Two holes, or bosses, have one wall if their axes agree within 11° and, at their overlap, within
 /// this share of the diameter, and their diameters within the same share.
 const ONE_AXIS: f64 = 0.98;
@@ -372,19 +321,6 @@ fn is_one_wall(one: &Feature, other_feature: &Feature) -> bool {
         && (is_rest || overlap > 0.5 * depth.min(other_depth))
         && (wide - other_wide).abs() < near
         && aside < near
-}
-
-/// Slots and pockets by contacts, and all others of the mesh.
-fn with_felt(felt: Vec<Slot>, (slots, pockets): (Vec<Slot>, Vec<Slot>)) -> (Vec<Slot>, Vec<Slot>) {
-    let is_new = |slot: &Slot| felt.iter().all(|one| !one.holds(slot));
-    let [slots, pockets] =
-        [slots, pockets].map(|found| found.into_iter().filter(is_new).collect::<Vec<_>>());
-    let (felt_pockets, felt_slots): (Vec<Slot>, Vec<Slot>) =
-        felt.into_iter().partition(|one| one.is_boxed);
-    (
-        [felt_slots, slots].concat(),
-        [felt_pockets, pockets].concat(),
-    )
 }
 
 /// Whether a wall is the half-round end of a slot: with the corners it may look like more than half
@@ -506,20 +442,6 @@ impl AxisEnd {
         met.map_or_else(
             || Self::unknown(point),
             |(own_std, place)| Self::at(measure, place, own_std),
-        )
-    }
-
-    /// Intersection of the axis with a touched plane; else `point`.
-    fn met(
-        measure: &Measure,
-        plane: &FittedSurface<Plane>,
-        point: &Point3<f64>,
-        axis: &Vector3<f64>,
-    ) -> Self {
-        let place = plane.met(point, axis);
-        place.map_or_else(
-            || Self::unknown(point),
-            |place| Self::at(measure, place.clone(), plane.own_std_at(&place.value)),
         )
     }
 
@@ -745,23 +667,6 @@ fn cylinder_feature(measure: &Measure, wall: &Wall) -> Feature {
     }
 }
 
-/// Touched share of both sides of a slot.
-///
-/// - `across`, `half`: from the middle to one side, and to one end, m.
-fn touched_sides(
-    measure: &Measure,
-    middle: &Point3<f64>,
-    across: &Vector3<f64>,
-    half: &Vector3<f64>,
-) -> f64 {
-    let side = |sign: f64| [-*half, *half].map(|end| middle + across * sign + end);
-    [1.0, -1.0]
-        .iter()
-        .map(|&sign| measure.observed.touched_along(&side(sign)))
-        .sum::<f64>()
-        / 2.0
-}
-
 fn slot_feature(measure: &Measure, slot: &Slot, kind: FeatureKind) -> Feature {
     let fitted = measure.stadium(slot);
     let axis = fitted.axis(&slot.out);
@@ -784,10 +689,7 @@ fn slot_feature(measure: &Measure, slot: &Slot, kind: FeatureKind) -> Feature {
     let near = start + direction * along + axis.value * (slot.centre - start).dot(&axis.value);
     let opening = AxisEnd::on(measure, Some(slot.land), &near, &axis.value);
     let bottom = near - axis.value * slot.depth;
-    let floor = match measure.felt_plane(&slot.felt_floor, &bottom, &axis.value) {
-        Some(felt) => AxisEnd::met(measure, &felt, &bottom, &axis.value),
-        None => AxisEnd::on(measure, slot.floor, &bottom, &axis.value),
-    };
+    let floor = AxisEnd::on(measure, slot.floor, &bottom, &axis.value);
     let centre = opening.centre(&fitted, Fit::middle_std);
     let length = if is_fixed(Freedom::Second) {
         length
@@ -795,17 +697,7 @@ fn slot_feature(measure: &Measure, slot: &Slot, kind: FeatureKind) -> Feature {
         slot.length
     };
     let half = direction * (length / 2.0);
-    let touched = if slot.walls.is_empty() {
-        let across = axis.value.cross(&direction) * (slot.width / 2.0);
-        touched_sides(
-            measure,
-            &(near - axis.value * (slot.depth / 2.0)),
-            &across,
-            &half,
-        )
-    } else {
-        measure.observed.touched_share(&slot.walls)
-    };
+    let touched = measure.observed.touched_share(&slot.walls);
     let depth = if slot.through == Some(true) && fitted.to == FittedTo::Mesh {
         MeasuredValue::new(slot.depth, None, Vec::new())
     } else {

@@ -7,6 +7,7 @@ use super::segmentation::scene::SegmentedMesh;
 use super::walls::Wall;
 use touchup_geometry::mesh::{BoxQuery, FaceId};
 use touchup_geometry::numeric::{median, tangent_basis};
+use touchup_method::stylus::ProbedPoint;
 
 /// A round hole.
 #[derive(Clone, Debug)]
@@ -60,6 +61,11 @@ const FILLED: f64 = 0.4;
 const SMALLER: f64 = 0.5;
 /// Tolerance of its position and radius, as a share of the radius.
 const REST: f64 = 0.3;
+/// Cosines of the lean of a countersink's face, 30° to 63°, its inner radius as a share of the outer,
+/// and minimum number of contacts on it.
+const CONE_COSINES: std::ops::Range<f64> = 0.45..0.87;
+const CONE_FROM: f64 = 0.4;
+const LEAST_ON_CONE: usize = 6;
 /// Minimum tilt of its axis, 6° as a cosine, unless its radius is the same.
 const STRAIGHT: f64 = 0.9945;
 /// Minimum height of a wall, in radii: a rim rounded by noise is lower.
@@ -128,9 +134,10 @@ impl WallEnd {
 }
 
 /// All round holes.
-pub(super) fn holes(parted: &SegmentedMesh, walls: &[Wall]) -> Vec<Hole> {
+pub(super) fn holes(parted: &SegmentedMesh, walls: &[Wall], touches: &[ProbedPoint]) -> Vec<Hole> {
     let is_hole = |wall: &Wall| wall.is_concave && !wall.is_cone();
     let numbers = (0..walls.len()).filter(|&at| is_hole(&walls[at]));
+    let numbers = numbers.filter(|&at| !is_rim_of_cone(parted, &walls[at], touches));
     let found: Vec<Hole> = numbers.filter_map(|at| hole(parted, walls, at)).collect();
     let is_of =
         |hole: &Hole, other: &Hole| is_fragment_of(parted, &walls[hole.wall], &walls[other.wall]);
@@ -139,6 +146,37 @@ pub(super) fn holes(parted: &SegmentedMesh, walls: &[Wall]) -> Vec<Hole> {
         .filter(|hole| !found.iter().any(|other| is_of(hole, other)))
         .cloned()
         .collect()
+}
+
+/// Whether a wall, felt along one edge alone, is the border of a countersink: contacts within it lie
+/// on a cone and not on a shoulder.
+fn is_rim_of_cone(parted: &SegmentedMesh, wall: &Wall, touches: &[ProbedPoint]) -> bool {
+    if !wall.is_edge {
+        return false;
+    }
+    let (middle, radius) = (wall.at(wall.middle()), wall.radius());
+    let felt = wall
+        .segments
+        .iter()
+        .flat_map(|&at| &parted.segment(at).felt);
+    let normals = felt.map(|felt| touches[felt.touch as usize].normal);
+    let lean = normals.sum::<Vector3<f64>>().dot(&wall.axis);
+    let out = wall.axis * lean.signum();
+    let near = 2.0 * parted.segment(wall.segments[0]).tolerance;
+    let is_within = |touch: &&ProbedPoint| {
+        let v = touch.point - middle;
+        let along = v.dot(&out);
+        let aside = (v - out * along).norm();
+        (-radius..-near).contains(&along) && (CONE_FROM * radius..radius - near).contains(&aside)
+    };
+    let cosines = touches
+        .iter()
+        .filter(is_within)
+        .map(|touch| touch.normal.dot(&out));
+    let (on_cone, others): (Vec<f64>, Vec<f64>) =
+        cosines.partition(|cosine| CONE_COSINES.contains(cosine));
+    let on_shoulder = others.iter().filter(|&&cosine| cosine > SQUARE);
+    on_cone.len() >= LEAST_ON_CONE && on_cone.len() > 2 * on_shoulder.count()
 }
 
 /// Whether a wall is a fragment of the same hole as a better one: with few touches it is crooked.
@@ -168,7 +206,7 @@ fn hole(parted: &SegmentedMesh, walls: &[Wall], at: usize) -> Option<Hole> {
     // mesh a gap
     let is_felt = wall.felt_turn > 0.0;
     let is_whole = wall.coverage >= HOLE_COVERAGE && (is_felt || wall.filled >= FILLED);
-    if !is_whole || wall.height() < LEAST_HEIGHT * radius || !is_felt && !is_free(parted, wall) {
+    if !is_whole || !is_felt && (wall.height() < LEAST_HEIGHT * radius || !is_free(parted, wall)) {
         return None;
     }
     let ends = [end(parted, wall, 0), end(parted, wall, 1)];

@@ -12,7 +12,7 @@ use super::fit::{
 };
 use super::observe::SegmentTouches;
 use super::segmentation::primitive::Primitive;
-use super::slots::Slot;
+use super::voids::Slot;
 use super::walls::Wall;
 use touchup_geometry::numeric::{order_statistic, spreads, tangent_basis};
 use touchup_method::stylus::ProbedPoint;
@@ -158,25 +158,6 @@ impl<'a> Measure<'a> {
         )
     }
 
-    /// The plane through touches, about square to `normal`; `None` without touches.
-    pub(crate) fn felt_plane(
-        &self,
-        touches: &[u32],
-        point: &Point3<f64>,
-        normal: &Vector3<f64>,
-    ) -> Option<FittedSurface<Plane>> {
-        let is_felt = !touches.is_empty();
-        is_felt.then(|| {
-            self.fitted(
-                &Plane::new(*point, normal),
-                touches.to_vec(),
-                &[],
-                Some(DRILLED),
-                None,
-            )
-        })
-    }
-
     /// The cylinder of a segment; `None` for other segments.
     pub(crate) fn shaft(&self, number: usize) -> Option<FittedSurface<Cylinder>> {
         let Primitive::Cylinder(guess) = self.observed.parted.segment(number).primitive else {
@@ -201,7 +182,15 @@ impl<'a> Measure<'a> {
     ///
     /// - `rim`: number of the plane around its opening.
     pub(crate) fn cylinder(&self, wall: &Wall, rim: Option<usize>) -> FittedSurface<Cylinder> {
-        let touches = self.touches_around(wall);
+        let mut touches = self.touches_around(wall);
+        let mut observations = self.observed.of_touches(&touches);
+        if touches.is_empty() {
+            // the ball rolled over its edge alone
+            let (at_edge, of_edge) = self.observed.of_edges(&wall.segments);
+            if at_edge.len() >= LEAST_TOUCHES && self.turn(&at_edge, wall) >= LEAST_TURN {
+                (touches, observations) = (at_edge, of_edge);
+            }
+        }
         let (mut axis, mut axis_sigma) = (wall.axis, None);
         let height = if touches.is_empty() {
             wall.height()
@@ -219,9 +208,9 @@ impl<'a> Measure<'a> {
             wall.radius(),
             wall.is_concave,
         );
-        self.fitted(
+        self.fitted_to(
+            (touches, observations),
             &guess,
-            touches,
             &self.observed.of_mesh(&wall.segments),
             axis_sigma,
             rim,
@@ -352,31 +341,51 @@ impl<'a> Measure<'a> {
         };
         let ends_of: Vec<usize> = slot.ends.into_iter().flatten().collect();
         let of_mesh = [of_part(&slot.walls, true), of_part(&ends_of, false)].concat();
+        let felt = self.felt_walls(slot, &guess, |p| is_of(p, true));
+        self.fitted_to(felt, &guess, &of_mesh, Some(DRILLED), Some(slot.land))
+    }
+
+    /// The touches on the walls and ends of a slot, with their observations: else those on the edges
+    /// of these; none if they are too few on one side.
+    ///
+    /// - `is_of_wall`: whether a place along the slot is on its walls.
+    fn felt_walls(
+        &self,
+        slot: &Slot,
+        guess: &Stadium,
+        is_of_wall: impl Fn(&Point3<f64>) -> bool,
+    ) -> (Vec<u32>, Vec<Observation>) {
+        let is_on_side = |number: &&u32, side: f64| {
+            let point = self.observed.touch(**number).point;
+            let q = guess.pose_of.inverse_transform_point(&point);
+            q.y * side > 0.25 * slot.width && is_of_wall(&point)
+        };
+        let is_enough = |touches: &[u32]| {
+            [1.0, -1.0].iter().all(|&side| {
+                let on_side = touches.iter().filter(|number| is_on_side(number, side));
+                on_side.count() >= LEAST_TOUCHES / 2
+            })
+        };
         let is_deep = |p: &Point3<f64>| {
             (0.0..slot.depth + BESIDE * slot.width).contains(&(slot.centre - p).dot(&slot.out))
         };
-        let touches = self.observed.touches_on(&guess, is_deep);
-        let on_wall = |touches: &[u32], side: f64| {
-            let is_there = |number: &&u32| {
-                let q = guess
-                    .pose_of
-                    .inverse_transform_point(&self.observed.touch(**number).point);
-                q.y * side > 0.25 * slot.width && is_of(&self.observed.touch(**number).point, true)
-            };
-            touches.iter().filter(is_there).count()
-        };
-        let is_enough = |touches: &[u32]| {
-            [1.0, -1.0]
-                .iter()
-                .all(|&side| on_wall(touches, side) >= LEAST_TOUCHES / 2)
-        };
         let touches = self.squarest(
-            touches,
+            self.observed.touches_on(guess, is_deep),
             |touch| touch.normal.dot(&slot.out).abs(),
-            |_| true,
+            |_| false,
             is_enough,
         );
-        self.fitted(&guess, touches, &of_mesh, Some(DRILLED), Some(slot.land))
+        if !touches.is_empty() {
+            let observations = self.observed.of_touches(&touches);
+            return (touches, observations);
+        }
+        let segments: Vec<usize> = slot.segments().collect();
+        let at_edge = self.observed.of_edges(&segments);
+        if is_enough(&at_edge.0) {
+            at_edge
+        } else {
+            Default::default()
+        }
     }
 
     /// Fits to touches; without touches, or if that fit fails, to the mesh.
@@ -391,12 +400,25 @@ impl<'a> Measure<'a> {
         axis_sigma: Option<f64>,
         around: Option<usize>,
     ) -> FittedSurface<S> {
+        let observations = self.observed.of_touches(&touches);
+        self.fitted_to((touches, observations), guess, of_mesh, axis_sigma, around)
+    }
+
+    /// As [`Self::fitted`], with the observations of the touches.
+    fn fitted_to<S: SurfaceModel>(
+        &self,
+        (touches, observations): (Vec<u32>, Vec<Observation>),
+        guess: &S,
+        of_mesh: &[Observation],
+        axis_sigma: Option<f64>,
+        around: Option<usize>,
+    ) -> FittedSurface<S> {
         let params = FitParams {
             axis_sigma,
             ..self.observed.fit_params(&touches)
         };
         if !touches.is_empty()
-            && let Ok(found) = fit(guess, &self.observed.of_touches(&touches), &params)
+            && let Ok(found) = fit(guess, &observations, &params)
         {
             let touches = touches
                 .into_iter()

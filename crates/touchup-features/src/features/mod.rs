@@ -5,7 +5,6 @@
 //! its [`clusters`] are the paper's method for the places of features.
 
 mod borders;
-mod by_contacts;
 mod cones;
 mod detect;
 mod elements;
@@ -21,8 +20,9 @@ mod relations;
 mod rims;
 mod segmentation;
 mod shafts;
-mod slots;
+mod surfaces;
 mod track;
+mod voids;
 mod walls;
 
 pub use detect::{Detection, detect};

@@ -9,7 +9,6 @@ use super::segmentation::facets::NONE;
 use super::segmentation::marks::NumberSet;
 use super::segmentation::primitive::Primitive;
 use super::segmentation::scene::SegmentedMesh;
-use super::slots::samples;
 use touchup_geometry::mesh::{FaceId, TriMesh, VertexId};
 use touchup_geometry::numeric::{PointGrid, VoxelKey, distinct, voxel_of};
 use touchup_method::stylus::ProbedPoint;
@@ -53,6 +52,8 @@ const REACH: f64 = 1e-3;
 const LEAST_SIGMA: f64 = 1e-6;
 /// Minimum weight of a touch.
 const LEAST_WEIGHT: f64 = 0.01;
+/// Number of points of a flat face of a drawing in a fit.
+const SAMPLES: usize = 60;
 /// Maximum number of vertices in a fit.
 const MOST_VERTICES: usize = 1500;
 /// Minimum number of selected vertices; with fewer, all count.
@@ -84,16 +85,28 @@ impl<'a> SegmentTouches<'a> {
             noise: TouchNoise::default(),
             reach,
         };
+        let mut is_placed = vec![false; touches.len()];
+        for (segment, of) in parted.segmentation.segments.iter().enumerate() {
+            for felt in &of.felt {
+                is_placed[felt.touch as usize] = true;
+                observed.grid.insert(felt.touch, &felt.place);
+            }
+            observed.of_segment[segment].extend(of.touches());
+        }
         for (number, touch) in touches
             .iter()
             .enumerate()
-            .filter(|(_, touch)| !touch.is_rejected)
+            .filter(|(number, touch)| !touch.is_rejected && !is_placed[*number])
         {
             if let Some(segment) = observed.segment_of(of_face, touch) {
                 observed.of_segment[segment].push(number as u32);
                 observed.grid.insert(number as u32, &touch.point);
             }
         }
+        observed
+            .of_segment
+            .iter_mut()
+            .for_each(|of| of.sort_unstable());
         let visits = (0..observed.of_segment.len()).map(|segment| observed.visits(segment));
         observed.noise = TouchNoise::of(visits, reach);
         observed
@@ -177,6 +190,29 @@ impl<'a> SegmentTouches<'a> {
         numbers.iter().map(observation).collect()
     }
 
+    /// Places of edges of some segments over which the ball rolled, as observations, with the
+    /// numbers of their touches.
+    pub(crate) fn of_edges(&self, segments: &[usize]) -> (Vec<u32>, Vec<Observation>) {
+        let felt = segments
+            .iter()
+            .flat_map(|&number| &self.parted.segment(number).felt);
+        let at_edge = felt.filter_map(|felt| {
+            let number = felt.touch;
+            let observation = observation(self.touch(number), self.group[number as usize]);
+            let sigma = observation.sigma * felt.at_edge?;
+            Some((
+                number,
+                Observation {
+                    point: felt.place,
+                    offset: 0.0,
+                    sigma,
+                    ..observation
+                },
+            ))
+        });
+        at_edge.unzip()
+    }
+
     /// As [`fit_params`].
     pub(crate) fn fit_params(&self, numbers: &[u32]) -> FitParams {
         fit_params(self.systematic(numbers), self.noise)
@@ -191,13 +227,6 @@ impl<'a> SegmentTouches<'a> {
     /// Whether the part has any touch.
     pub(crate) fn has_touches(&self) -> bool {
         !self.touches.is_empty()
-    }
-
-    /// The touches except outliers, with their numbers.
-    pub(crate) fn sound(&self) -> impl Iterator<Item = (u32, &ProbedPoint)> {
-        (0..)
-            .zip(self.touches)
-            .filter(|(_, touch)| !touch.is_rejected)
     }
 
     /// Maximum distance from a touch to a touched place, m: the radius of the ball.
@@ -382,6 +411,30 @@ pub(super) fn systematic<'a>(touches: impl Iterator<Item = &'a ProbedPoint>) -> 
         )
     });
     sum.map(|sum| sum / count.max(1.0))
+}
+
+/// Points of a segment, spread over its faces.
+fn samples(parted: &SegmentedMesh, number: usize) -> Vec<Point3<f64>> {
+    let faces = &parted.segment(number).faces;
+    let step = faces.len().div_ceil(SAMPLES).max(1);
+    let each = (SAMPLES / faces.len().max(1)).clamp(1, 16);
+    let rows = (each as f64).sqrt() as usize;
+    let mut points = Vec::new();
+    for &face in faces.iter().step_by(step) {
+        let [a, b, c] = parted.facets.triangle(face);
+        for k in 0..rows * rows {
+            // a lattice of the unit square, folded onto the triangle
+            let (u, v) = ((k % rows) as f64 + 0.4, (k / rows) as f64 + 0.4);
+            let (u, v) = (u / rows as f64, v / rows as f64);
+            let (u, v) = if u + v > 1.0 {
+                (1.0 - u, 1.0 - v)
+            } else {
+                (u, v)
+            };
+            points.push(a + (b - a) * u + (c - a) * v);
+        }
+    }
+    points
 }
 
 /// Whether a vertex is between two others of its faces on a line other than the straight lines of

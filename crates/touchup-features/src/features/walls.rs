@@ -7,7 +7,7 @@ use nalgebra::{Point3, Vector3};
 use super::fit::SurfaceModel;
 use super::segmentation::facets::Facets;
 use super::segmentation::primitive::Primitive;
-use super::segmentation::segment::Segmentation;
+use super::segmentation::segment::{Segment, Segmentation};
 use touchup_geometry::numeric::{median, tangent_basis};
 
 /// A round wall, perhaps interrupted.
@@ -31,6 +31,8 @@ pub(super) struct Wall {
     pub coverage: f64,
     /// share of the turn covered by contacts alone, 0 unless they are all around
     pub felt_turn: f64,
+    /// whether the ball felt it along its edge alone: that hardly shows its axis
+    pub is_edge: bool,
     /// share of its area between its ends that its faces cover
     pub filled: f64,
     /// unit vector from the axis to the middle of the covered parts of the turn; 0 if undefined
@@ -42,10 +44,14 @@ const PARTS: usize = 72;
 /// Minimum share of a turn of contacts all around: those on the end of a slot, or in a notch, are
 /// not.
 pub(super) const ALL_AROUND: f64 = 0.75;
+/// Half of the turn that a contact covers, rad: 7°.
+const BESIDE_CONTACT: f64 = 0.12;
 /// Axes of one wall differ by less: 6°.
 const SAME_AXIS: f64 = 0.9945;
 /// Tolerance of radii, and of positions of the axis, of one wall, as a share.
 const SAME_RADIUS: f64 = 0.08;
+/// Maximum distance of the middle of a wall's edge from its axis, in radii.
+const EDGE_OFF: f64 = 0.15;
 /// Maximum gap between pieces of a wall along the axis, in radii.
 pub(super) const SAME_WALL: f64 = 2.0;
 
@@ -75,31 +81,42 @@ impl Wall {
     fn of(facets: &Facets, segmentation: &Segmentation, segments: Vec<usize>) -> Option<Self> {
         let of_wall = |&number: &usize| segmentation.segments[number].faces.iter().copied();
         let faces: Vec<u32> = segments.iter().flat_map(of_wall).collect();
-        let felt_turns = segments
+        let felt: Vec<Point3<f64>> = segments
             .iter()
-            .map(|&number| segmentation.segments[number].felt_turn);
-        let felt_turn = felt_turns
-            .filter(|&turn| turn >= ALL_AROUND)
-            .fold(0.0, f64::max);
-        let wall = Self::of_faces(
+            .flat_map(|&number| &segmentation.segments[number].felt)
+            .map(|felt| felt.place)
+            .collect();
+        let of_walls = segments
+            .iter()
+            .map(|&number| &segmentation.segments[number]);
+        let is_edge = !felt.is_empty() && of_walls.flat_map(Segment::touches).next().is_none();
+        let wall = Self::of_evidence(
             facets,
             &segmentation.segments[segments[0]].primitive,
             &faces,
+            &felt,
             segments,
         )?;
-        Some(Self {
-            coverage: wall.coverage.max(felt_turn),
-            felt_turn,
-            ..wall
-        })
+        Some(Self { is_edge, ..wall })
     }
 
     /// The wall of these faces; `None` for a plane.
-    #[expect(clippy::too_many_lines)]
     pub(crate) fn of_faces(
         facets: &Facets,
         primitive: &Primitive,
         faces: &[u32],
+        segments: Vec<usize>,
+    ) -> Option<Self> {
+        Self::of_evidence(facets, primitive, faces, &[], segments)
+    }
+
+    /// The wall of these faces and places of contacts; `None` for a plane.
+    #[expect(clippy::too_many_lines)]
+    fn of_evidence(
+        facets: &Facets,
+        primitive: &Primitive,
+        faces: &[u32],
+        felt: &[Point3<f64>],
         segments: Vec<usize>,
     ) -> Option<Self> {
         let (origin, axis, radius_at_origin, half_angle, is_concave) = match primitive {
@@ -129,6 +146,17 @@ impl Wall {
                     .for_each(|t| parts[part] = [parts[part][0].min(*t), parts[part][1].max(*t)]);
             }
         }
+        let mut felt_spans = Vec::with_capacity(felt.len());
+        for v in felt.iter().map(|place| place - origin) {
+            let (t, turn) = (v.dot(&axis), v.dot(&g).atan2(v.dot(&e)));
+            let span = [turn - BESIDE_CONTACT, turn + BESIDE_CONTACT];
+            felt_spans.push(span);
+            for part in parts_between(span) {
+                parts[part] = [parts[part][0].min(t), parts[part][1].max(t)];
+            }
+        }
+        spans.extend(&felt_spans);
+        let felt_turn = covered_share(felt_spans);
         let covered: Vec<_> = parts.iter().filter(|part| part[0] <= part[1]).collect();
         let coverage = covered_share(spans);
         // the usual end, not the farthest: walls have ears
@@ -160,7 +188,12 @@ impl Wall {
             axis,
             ends,
             coverage,
-            felt_turn: 0.0,
+            felt_turn: if felt_turn >= ALL_AROUND {
+                felt_turn
+            } else {
+                0.0
+            },
+            is_edge: false,
             filled,
             towards,
         };
@@ -185,17 +218,27 @@ impl Wall {
         };
         is_same
             && self.is_concave == other.is_concave
-            && self.is_coaxial(other, SAME_RADIUS)
+            && match (self.is_edge, other.is_edge) {
+                (_, true) => self.is_about(&other.at(other.middle()), EDGE_OFF * self.radius()),
+                (true, _) => other.is_about(&self.at(self.middle()), EDGE_OFF * self.radius()),
+                _ => self.is_coaxial(other, SAME_RADIUS),
+            }
             && self.gap(other) < SAME_WALL * self.radius()
     }
 
     /// Whether the axes are one within a share of the radius.
     pub(crate) fn is_coaxial(&self, other: &Self, share: f64) -> bool {
-        let middle = other.at(other.middle());
-        let v = middle - self.origin;
-        let off = (v - self.axis * v.dot(&self.axis)).norm();
         self.axis.dot(&other.axis).abs() > SAME_AXIS
-            && off < share * self.radius().max(other.radius())
+            && self.is_about(
+                &other.at(other.middle()),
+                share * self.radius().max(other.radius()),
+            )
+    }
+
+    /// Whether a point is within a distance, m, of the axis.
+    fn is_about(&self, p: &Point3<f64>, distance: f64) -> bool {
+        let v = p - self.origin;
+        (v - self.axis * v.dot(&self.axis)).norm() < distance
     }
 
     /// Distance between the walls along the axis, m; negative for an overlap.

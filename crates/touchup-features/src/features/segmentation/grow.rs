@@ -362,7 +362,7 @@ impl<'a> RegionGrower<'a> {
             area,
             tolerance,
             is_exact,
-            felt_turn: 0.0,
+            felt: Vec::new(),
         })
     }
 

@@ -346,7 +346,9 @@ fn moved_to<S: SurfaceModel, const N: usize>(
 }
 
 /// Numbers of the freedoms of a surface.
-const fn numbers_of_free<const N: usize>(has: [bool; FREEDOMS]) -> [usize; N] {
+pub(in crate::features) const fn numbers_of_free<const N: usize>(
+    has: [bool; FREEDOMS],
+) -> [usize; N] {
     let (mut numbers, mut count, mut freedom) = ([0; N], 0, 0);
     while freedom < FREEDOMS {
         if has[freedom] {

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeSet;
 
+use nalgebra::Point3;
+
 use super::facets::{Facets, NONE};
 use super::marks::sort;
 use super::primitive::{Primitive, belongs, plane_of};
@@ -21,8 +23,28 @@ pub(crate) struct Segment {
     pub tolerance: f64,
     /// its corners lie on it as in a drawing, not as in a measurement
     pub is_exact: bool,
-    /// share of a turn that contacts alone show, otherwise 0
-    pub felt_turn: f64,
+    /// contacts that show it, by the numbers of their touches
+    pub felt: Vec<FeltPlace>,
+}
+
+/// A place of a surface that a touch shows.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct FeltPlace {
+    /// number of the touch
+    pub touch: u32,
+    /// m, in O
+    pub place: Point3<f64>,
+    /// at an edge of the surface over which the ball rolled: standard deviation of the place, in
+    /// those of the touch
+    pub at_edge: Option<f64>,
+}
+
+impl Segment {
+    /// Numbers of the touches on its face, not on an edge.
+    pub(crate) fn touches(&self) -> impl Iterator<Item = u32> + '_ {
+        let on_face = self.felt.iter().filter(|felt| felt.at_edge.is_none());
+        on_face.map(|felt| felt.touch)
+    }
 }
 
 /// All segments of a mesh.
@@ -158,11 +180,19 @@ impl Segmentation {
             whole.area += part.area;
             whole.tolerance = whole.tolerance.max(part.tolerance);
             whole.faces.extend(part.faces);
+            if part.felt.len() > whole.felt.len() {
+                whole.primitive = part.primitive;
+            }
+            whole.felt.extend(part.felt);
             joint.push(number_of[of]);
         }
         for number in distinct(joint) {
             let whole = &mut self.segments[number];
             sort(&mut whole.faces, facets.slots());
+            if !whole.felt.is_empty() {
+                whole.felt.sort_by_key(|felt| felt.touch);
+                continue;
+            }
             let origin = facets.triangle(whole.faces[0])[0];
             whole.primitive =
                 plane_of(facets, origin, whole.faces.iter().copied()).unwrap_or(whole.primitive);

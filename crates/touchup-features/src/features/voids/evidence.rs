@@ -1,0 +1,212 @@
+//! Evidence of each segment: places of its faces and of its contacts.
+
+use nalgebra::{Point2, Point3, Vector2, Vector3};
+
+use crate::features::segmentation::scene::SegmentedMesh;
+use touchup_geometry::numeric::PointGrid;
+
+/// Number of parts of the side of a drawn face.
+const PARTS: usize = 6;
+/// Gap between pieces of one wall: in radii of the ball, in median edges of a measured mesh, and in a
+/// drawing, m.
+const GAP_RADII: f64 = 4.0;
+const GAP_EDGES: f64 = 4.0;
+const GAP_DRAWN: f64 = 1e-6;
+/// Half of the extent of a contact, in radii of the ball.
+const HALF_CONTACT: f64 = 0.1;
+/// Components of a wall's normal along an axis: 6°; with contacts, which may lie along one edge, 16°.
+const SQUARE: f64 = 0.1;
+const SQUARE_FELT: f64 = 0.27;
+
+/// A place of a surface.
+#[derive(Clone, Copy)]
+pub(super) struct SegmentPlace {
+    pub point: Point3<f64>,
+    /// half of its extent, m
+    pub half: f64,
+    pub segment: u32,
+}
+
+/// A connected piece of a flat wall, seen along an axis.
+pub(super) struct WallPiece {
+    pub segment: usize,
+    pub at: Point2<f64>,
+    pub normal: Vector2<f64>,
+    /// range along the wall and along the axis, m
+    pub span: [f64; 2],
+    pub height: [f64; 2],
+}
+
+impl WallPiece {
+    /// Unit vector along the wall.
+    pub(super) fn along(&self) -> Vector2<f64> {
+        Vector2::new(self.normal.y, -self.normal.x)
+    }
+}
+
+/// The evidence of a segmented mesh.
+pub(super) struct SegmentEvidence<'a> {
+    pub parted: &'a SegmentedMesh<'a>,
+    pub of_segment: Vec<Vec<SegmentPlace>>,
+    felt: Vec<SegmentPlace>,
+    grid: PointGrid,
+    /// gap between pieces of one surface, m, by segment
+    gap: Vec<f64>,
+    /// radius of the ball, m
+    pub radius: f64,
+}
+
+impl<'a> SegmentEvidence<'a> {
+    pub(super) fn of(parted: &'a SegmentedMesh<'a>, radius: f64) -> Self {
+        let of_segment: Vec<Vec<SegmentPlace>> = (0..parted.segmentation.segments.len())
+            .map(|number| evidence_of(parted, number, radius))
+            .collect();
+        let by_mesh = match parted.rounding {
+            Some(_) => GAP_DRAWN,
+            None => GAP_EDGES * parted.edge,
+        };
+        let gap = parted.segmentation.segments.iter().map(|segment| {
+            if segment.felt.is_empty() {
+                by_mesh
+            } else {
+                by_mesh.max(GAP_RADII * radius)
+            }
+        });
+        let felt: Vec<SegmentPlace> = (0..parted.segmentation.segments.len())
+            .flat_map(|number| felt_places(parted, number, radius))
+            .collect();
+        let mut grid = PointGrid::new(radius);
+        (0..)
+            .zip(&felt)
+            .for_each(|(at, one)| grid.insert(at, &one.point));
+        Self {
+            parted,
+            gap: gap.collect(),
+            of_segment,
+            felt,
+            grid,
+            radius,
+        }
+    }
+
+    /// Contacts around a place, of any segment.
+    pub(super) fn felt_near(
+        &self,
+        p: &Point3<f64>,
+        reach: f64,
+    ) -> impl Iterator<Item = &SegmentPlace> {
+        self.grid.near(p, reach).map(|number| &self.felt[number])
+    }
+
+    /// Whether a segment has contacts.
+    pub(super) fn is_felt(&self, number: usize) -> bool {
+        !self.parted.segment(number).felt.is_empty()
+    }
+
+    /// The pieces of flat walls along an axis.
+    ///
+    /// - `basis`: of the plane square to it.
+    pub(super) fn pieces(&self, axis: &Vector3<f64>, basis: &[Vector3<f64>; 2]) -> Vec<WallPiece> {
+        let flat = |v: &Vector3<f64>| Vector2::new(v.dot(&basis[0]), v.dot(&basis[1]));
+        let mut pieces = Vec::new();
+        for (number, point, normal) in self.parted.planes() {
+            let is_felt = self.is_felt(number);
+            let square = if is_felt { SQUARE_FELT } else { SQUARE };
+            let is_named = is_felt || self.parted.is_strong(number);
+            if !is_named || normal.dot(axis).abs() > square {
+                continue;
+            }
+            let Some(normal) = flat(&normal).try_normalize(0.0) else {
+                continue;
+            };
+            let at = Point2::from(flat(&point.coords));
+            let whole = WallPiece {
+                segment: number,
+                at,
+                normal,
+                span: [f64::INFINITY, f64::NEG_INFINITY],
+                height: [f64::INFINITY, f64::NEG_INFINITY],
+            };
+            pieces.extend(self.parts(whole, axis, basis));
+        }
+        pieces
+    }
+
+    /// The connected pieces of a wall.
+    fn parts(
+        &self,
+        whole: WallPiece,
+        axis: &Vector3<f64>,
+        basis: &[Vector3<f64>; 2],
+    ) -> Vec<WallPiece> {
+        let along = whole.along();
+        let along = basis[0] * along.x + basis[1] * along.y;
+        let origin = (basis[0] * whole.at.x + basis[1] * whole.at.y).dot(&along);
+        let mut places: Vec<(f64, f64, f64)> = self.of_segment[whole.segment]
+            .iter()
+            .map(|one| {
+                let v = one.point.coords;
+                (v.dot(&along) - origin, v.dot(axis), one.half)
+            })
+            .collect();
+        places.sort_by(|a, b| (a.0 - a.2).total_cmp(&(b.0 - b.2)));
+        let mut parts: Vec<WallPiece> = Vec::new();
+        let mut last = f64::NEG_INFINITY;
+        for (x, z, half) in places {
+            if x - half > last + self.gap[whole.segment] {
+                parts.push(WallPiece { ..whole });
+            }
+            last = last.max(x + half);
+            // places of a drawn face reach its corners
+            let half = if self.parted.rounding.is_some() {
+                0.0
+            } else {
+                half
+            };
+            if let Some(part) = parts.last_mut() {
+                part.span = [part.span[0].min(x - half), part.span[1].max(x + half)];
+                part.height = [part.height[0].min(z - half), part.height[1].max(z + half)];
+            }
+        }
+        parts
+    }
+}
+
+fn evidence_of(parted: &SegmentedMesh, number: usize, radius: f64) -> Vec<SegmentPlace> {
+    let segment = parted.segment(number);
+    let mut all = Vec::new();
+    let place = |point, half| SegmentPlace {
+        point,
+        half,
+        segment: number as u32,
+    };
+    for &face in &segment.faces {
+        let [a, b, c] = parted.facets.triangle(face);
+        let size = (b - a).norm().max((c - a).norm()).max((c - b).norm());
+        if parted.rounding.is_none() {
+            all.push(place(a + ((b - a) + (c - a)) / 3.0, size / 3.0));
+            continue;
+        }
+        for (i, k) in (0..=PARTS).flat_map(|i| (0..=PARTS - i).map(move |k| (i, k))) {
+            let [u, v] = [i, k].map(|at| at as f64 / PARTS as f64);
+            let point = a + (b - a) * u + (c - a) * v;
+            all.push(place(point, size / (2 * PARTS) as f64));
+        }
+    }
+    all.extend(felt_places(parted, number, radius));
+    all
+}
+
+/// Places of the touches of a segment.
+fn felt_places<'a>(
+    parted: &'a SegmentedMesh,
+    number: usize,
+    radius: f64,
+) -> impl Iterator<Item = SegmentPlace> + 'a {
+    let felt = parted.segment(number).felt.iter();
+    felt.map(move |felt| SegmentPlace {
+        point: felt.place,
+        half: HALF_CONTACT * radius,
+        segment: number as u32,
+    })
+}
