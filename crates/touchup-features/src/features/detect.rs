@@ -371,53 +371,52 @@ fn between(from: &AxisEnd, to: &AxisEnd, direction: &Vector3<f64>) -> MeasuredVa
     )
 }
 
-/// Margin of a lower bound, in standard deviations of the lean of touches on its wall, times the
-/// radius of the ball.
-const LEAN_SIGMAS: f64 = 3.0;
+/// Maximum residual of a touch over the edge of a wall that passes for one on the wall, in root mean
+/// square residuals.
+const OVER_SIGMAS: f64 = 3.0;
 
 /// Distance between the ends of a wall. An untouched end of a touched wall may be a guess: the
-/// distance is then the touched extent of the wall, a lower bound.
+/// distance is then the touched extent of the wall, a lower bound; `None`: it is touched along an edge
+/// alone.
 fn extent<S>(
     measure: &Measure,
     fitted: &FittedSurface<S>,
     from: &AxisEnd,
     to: &AxisEnd,
     out: &Vector3<f64>,
-) -> MeasuredValue<f64> {
+) -> Option<MeasuredValue<f64>> {
     let is_felt = [from, to].map(|end| !end.place.touches.is_empty());
     if fitted.to == FittedTo::Mesh || is_felt == [true; 2] {
-        return between(from, to, out);
+        return Some(between(from, to, out));
     }
     let side = (to.place.value - from.place.value).dot(out).signum();
     let along = |point: &Point3<f64>| (point - from.place.value).dot(out) * side;
-    // height of a touch: the less far of its centre and its point by the measured normal
     let of_wall = || {
         fitted
             .touches
             .iter()
             .map(|&number| measure.observed.touch(number))
     };
+    // of a touch the less far of its centre and its point by the measured normal
     let heights = of_wall().map(|touch| [along(&touch.centre), along(&touch.point)]);
     let (lowest, highest) = heights.fold((f64::MAX, f64::MIN), |(low, high), [a, b]| {
         (low.min(a.max(b)), high.max(a.min(b)))
     });
-    // a touch over the edge leans as others lean by friction and noise, and is farther than it
-    // seems
-    let leans: f64 = of_wall().map(|touch| touch.normal.dot(out).powi(2)).sum();
     let radius = of_wall().map(|touch| touch.radius).fold(0.0, f64::max);
-    let beyond = LEAN_SIGMAS * (leans / fitted.touches.len().max(1) as f64).sqrt() * radius;
+    // over the edge the ball leaves the wall by its radius less its cosine
+    let beyond = (2.0 * radius * OVER_SIGMAS * fitted.uneven).sqrt();
     let begin = if is_felt[0] { 0.0 } else { lowest + beyond };
     let end = if is_felt[1] {
         along(&to.place.value)
     } else {
         highest - beyond
     };
-    MeasuredValue {
-        value: (end - begin).max(0.0),
+    (end > begin).then(|| MeasuredValue {
+        value: end - begin,
         touches: fitted.touches.clone(),
         is_at_least: true,
         ..MeasuredValue::default()
-    }
+    })
 }
 
 impl AxisEnd {
@@ -505,7 +504,7 @@ fn hole_feature(measure: &Measure, walls: &[Wall], hole: &Hole) -> Feature {
     let cone = hole.countersink.and_then(|cone| measure.cone(&walls[cone]));
     Feature {
         diameter: Some(fitted.number(2.0 * fitted.surface.radius, &[(Freedom::Size, 2.0)])),
-        depth: Some(extent(measure, &fitted, &opening, &floor, &axis.value)),
+        depth: extent(measure, &fitted, &opening, &floor, &axis.value),
         axis: Some(axis),
         through: hole.through.filter(|_| is_known),
         walls: Some(Walls::Round(fitted.surface)),
@@ -626,7 +625,7 @@ fn boss_feature(measure: &Measure, walls: &[Wall], boss: &Boss) -> Feature {
     let centre = foot.centre(&fitted, |fit| fit.lateral_std(&foot.place.value));
     Feature {
         diameter: Some(fitted.number(2.0 * fitted.surface.radius, &[(Freedom::Size, 2.0)])),
-        depth: Some(extent(measure, &fitted, &foot, &top, &axis.value)),
+        depth: extent(measure, &fitted, &foot, &top, &axis.value),
         axis: Some(axis),
         walls: Some(Walls::Round(fitted.surface)),
         form: measure.round_form(&fitted, &wall.segments).map(Form::Round),
@@ -699,7 +698,7 @@ fn slot_feature(measure: &Measure, slot: &Slot, kind: FeatureKind) -> Feature {
     let half = direction * (length / 2.0);
     let touched = measure.observed.touched_share(&slot.walls);
     let depth = if slot.through == Some(true) && fitted.to == FittedTo::Mesh {
-        MeasuredValue::new(slot.depth, None, Vec::new())
+        Some(MeasuredValue::new(slot.depth, None, Vec::new()))
     } else {
         extent(measure, &fitted, &opening, &floor, &axis.value)
     };
@@ -709,7 +708,7 @@ fn slot_feature(measure: &Measure, slot: &Slot, kind: FeatureKind) -> Feature {
         direction: Some(direction),
         width: Some(fitted.number(width, &[(Freedom::Size, 1.0)])),
         length: Some(fitted.number(length, &[(Freedom::Second, 1.0)])),
-        depth: Some(depth),
+        depth,
         axis: Some(axis),
         through: slot.through,
         walls: Some(Walls::Slot(fitted.surface)),

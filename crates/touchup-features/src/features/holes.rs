@@ -128,8 +128,12 @@ struct WallEnd {
 impl WallEnd {
     /// Whether a hollow wall behind it has the same axis.
     fn goes_on_in(&self, wall: &Wall, other: &Wall) -> bool {
-        let beyond = (other.at(other.middle()) - wall.at(self.t)).dot(&wall.axis) * self.out;
-        other.is_concave && other.is_coaxial(wall, SAME_AXIS) && beyond > 0.0
+        let middle = other.at(other.middle());
+        let beyond = (middle - wall.at(self.t)).dot(&wall.axis) * self.out;
+        let near = SAME_AXIS * wall.radius().max(other.radius());
+        // the axis of a short wall is hardly known
+        let is_along = other.axis.dot(&wall.axis).abs() > SQUARE;
+        other.is_concave && is_along && wall.is_about(&middle, near) && beyond > 0.0
     }
 }
 
@@ -237,10 +241,13 @@ fn hole(parted: &SegmentedMesh, walls: &[Wall], at: usize) -> Option<Hole> {
         .filter(|&cone| walls[cone].axis.dot(&wall.axis) * other.out < 0.0);
     // at the tip of a drill the depth is that of the cylinder
     let closed_at = other.closed_at.filter(|_| tip.is_none());
-    let floor = match shoulder(parted, walls, at, &other) {
-        Some(shoulder) => Some((shoulder, other.t)),
+    let floor = match narrower(parted, walls, at, &other) {
+        // a floor farther on is that of the narrower hole
+        Some(next) => shoulder(parted, wall, next, &other).map(|plane| (plane, other.t)),
         None => closed_at.and_then(|t| Some((floor_at(parted, wall, t)?, t))),
     };
+    // a head felt along its border alone shows no shoulder
+    let floor = floor.filter(|(number, _)| rim.is_none_or(|(land, _)| land != *number));
     let bottom = match other.closed_at {
         Some(_) => floor.map_or(other.t, |(_, t)| t),
         None => floor
@@ -265,20 +272,30 @@ fn hole(parted: &SegmentedMesh, walls: &[Wall], at: usize) -> Option<Hole> {
     })
 }
 
-/// The plane at which a hole narrows, if another hole continues behind it.
-fn shoulder(parted: &SegmentedMesh, walls: &[Wall], at: usize, end: &WallEnd) -> Option<usize> {
+/// The narrower hole that continues a hole.
+fn narrower<'a>(
+    parted: &SegmentedMesh,
+    walls: &'a [Wall],
+    at: usize,
+    end: &WallEnd,
+) -> Option<&'a Wall> {
     let wall = &walls[at];
+    let tolerance = |wall: &Wall| parted.segment(wall.segments[0]).tolerance;
     let is_next = |next: &&Wall| {
-        let is_near = next.gap(wall).abs() < SAME_HOLE * wall.radius();
         !next.is_cone()
             && next.coverage >= HOLE_COVERAGE
-            && next.radius() < wall.radius()
-            && is_near
+            && next.radius() + tolerance(next) < wall.radius() - tolerance(wall)
+            && end.goes_on_in(wall, next)
     };
-    let next = walls
-        .iter()
-        .filter(|next| end.goes_on_in(wall, next))
-        .find(is_next)?;
+    let nearest = |a: &&Wall, b: &&Wall| a.gap(wall).abs().total_cmp(&b.gap(wall).abs());
+    walls.iter().filter(is_next).min_by(nearest)
+}
+
+/// The plane at which a hole narrows.
+fn shoulder(parted: &SegmentedMesh, wall: &Wall, next: &Wall, end: &WallEnd) -> Option<usize> {
+    if next.gap(wall).abs() > SAME_HOLE * wall.radius() {
+        return None;
+    }
     let ring = [(wall.radius() + next.radius()) / 2.0];
     let (middle, opening) = (wall.at(end.t), wall.axis * -end.out);
     let around = parted.around(wall.segments[0]);

@@ -13,7 +13,7 @@ use super::fit::{
 use super::observe::SegmentTouches;
 use super::segmentation::primitive::Primitive;
 use super::voids::Slot;
-use super::walls::Wall;
+use super::walls::{ALL_AROUND, Wall};
 use touchup_geometry::numeric::{order_statistic, spreads, tangent_basis};
 use touchup_method::stylus::ProbedPoint;
 
@@ -26,7 +26,7 @@ pub(super) struct FittedSurface<S> {
     /// numbers of the used touches
     pub touches: Vec<u32>,
     pub to: FittedTo,
-    /// for a mesh, root mean square residual, m
+    /// root mean square residual, m
     pub uneven: f64,
     /// whether the residuals give the error of the surface: true for touches, and for a mesh
     /// without touches; beside touches, an untouched surface may be off as a whole
@@ -249,9 +249,18 @@ impl<'a> Measure<'a> {
                 Vec::new()
             };
         }
+        // beside a gap of the wall the ball rolls over an edge along the axis too
+        let is_whole = self.turn(&touches, wall) > ALL_AROUND;
         self.squarest(
             touches,
-            |touch| touch.normal.dot(&wall.axis).abs(),
+            |touch| {
+                if is_whole {
+                    return touch.normal.dot(&wall.axis).abs();
+                }
+                let v = touch.centre - wall.origin;
+                let radial = v - wall.axis * v.dot(&wall.axis);
+                radial.cross(&touch.normal).norm() / radial.norm()
+            },
             |_| true,
             is_enough,
         )
@@ -427,12 +436,13 @@ impl<'a> Measure<'a> {
                 .map(|(touch, _)| touch);
             let touches = touches.collect();
             let (surface, to) = (found.surface.clone(), FittedTo::Touches);
+            let uneven = found.unevenness(&observations);
             return FittedSurface {
                 surface,
                 fit: Some(found),
                 touches,
                 to,
-                uneven: 0.0,
+                uneven,
                 is_confirmed: true,
             };
         }

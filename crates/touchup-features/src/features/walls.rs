@@ -236,7 +236,7 @@ impl Wall {
     }
 
     /// Whether a point is within a distance, m, of the axis.
-    fn is_about(&self, p: &Point3<f64>, distance: f64) -> bool {
+    pub(super) fn is_about(&self, p: &Point3<f64>, distance: f64) -> bool {
         let v = p - self.origin;
         (v - self.axis * v.dot(&self.axis)).norm() < distance
     }
