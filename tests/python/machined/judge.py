@@ -29,6 +29,8 @@ class Verdict:
     errors: dict = field(default_factory=lambda: defaultdict(list))
     # lower bounds that are above the truth, and all
     bounds: list = field(default_factory=lambda: [0, 0])
+    # touched edges without a true one, and all
+    edges: list = field(default_factory=lambda: [0, 0])
     # (true feature, found feature)
     pairs: list = field(default_factory=list)
 

@@ -12,6 +12,7 @@ import trimesh
 from scipy.spatial import cKDTree
 
 from .families import random_part
+from .edges import note_edges
 from .judge import TOUCHED, Verdict, described, judge
 from .part import Part
 
@@ -70,6 +71,7 @@ class Result:
             "wrong_kind": wrong_kind,
             "errors": errors,
             "bounds": {"above": int(verdict.bounds[0]), "all": verdict.bounds[1]},
+            "edges": {"without_true": verdict.edges[0], "all": verdict.edges[1]},
         }
 
     def lines(self):
@@ -94,6 +96,7 @@ class Totals:
         self.counts = defaultdict(lambda: dict.fromkeys(["required", "missed", "false", "found", "kind"], 0))
         self.errors = defaultdict(list)
         self.bounds = [0, 0]
+        self.edges = [0, 0]
 
     def add(self, result):
         of, verdict = self.counts[result.world], result.verdict
@@ -105,6 +108,7 @@ class Totals:
         for key, values in verdict.errors.items():
             self.errors[result.world, *key].extend(values)
         self.bounds = [a + b for a, b in zip(self.bounds, verdict.bounds)]
+        self.edges = [a + b for a, b in zip(self.edges, verdict.edges)]
 
     def table(self):
         lines = ["| world | required | found | false | of another kind |", "|---|---|---|---|---|"]
@@ -118,6 +122,7 @@ class Totals:
             rms = np.sqrt(np.mean(error**2))
             lines.append(f"| {' | '.join(key)} | {len(error)} | {ratio:.2f} | {rms:.4f} | {np.median(std):.4f} |")
         lines += ["", f"Lower bounds above the truth: {self.bounds[0]} of {self.bounds[1]}."]
+        lines += [f"Touched edges without a true one: {self.edges[0]} of {self.edges[1]}."]
         return "\n".join(lines)
 
 
@@ -207,4 +212,6 @@ def part_run(touchup, out, seed, world, scanner):
     fits = [feature.entry_mm > 2 * radius + ROOM_MM for feature in part.features]
     required = [not f.is_optional and fit and share > TOUCHED for f, fit, share in zip(part.features, fits, shares)]
     name = f"{seed} {family} {world or 'plain'}"
-    return Result(name, world or "plain", part, shares, judge(features, part.features, required), folder.name)
+    verdict = judge(features, part.features, required)
+    note_edges(verdict, features, mesh)
+    return Result(name, world or "plain", part, shares, verdict, folder.name)
