@@ -112,7 +112,7 @@ impl AxisView<'_> {
             reach: [a[1].max(b[1]) - middle, middle - a[0].min(b[0])],
             half_height: (top - level).max(level - bottom),
         };
-        void.slot([void.end(1.0), void.end(-1.0)])
+        void.slot(|void| [void.end(1.0), void.end(-1.0)])
     }
 
     /// The slot between a flat wall and the half-round end that continues it: its other wall may
@@ -152,7 +152,7 @@ impl AxisView<'_> {
             half_height: (top - bottom) / 2.0,
         };
         let known = VoidEnd::round(end.segments[0], (distance + width) / 2.0);
-        void.slot([void.end(1.0), known])
+        void.slot(|void| [void.end(1.0), known])
     }
 
     /// The slot between two half-round ends, each open towards the other: its flat walls may hardly
@@ -189,7 +189,7 @@ impl AxisView<'_> {
             half_height: (top - bottom) / 2.0,
         };
         let far = (distance + width) / 2.0;
-        void.slot([other, one].map(|end| VoidEnd::round(end.segments[0], far)))
+        void.slot(|_| [other, one].map(|end| VoidEnd::round(end.segments[0], far)))
     }
 }
 

@@ -1,17 +1,21 @@
 //! Evidence of each segment: places of its faces and of its contacts.
 
+use std::collections::BTreeMap;
+
 use nalgebra::{Point2, Point3, Vector2, Vector3};
 
 use crate::features::segmentation::scene::SegmentedMesh;
 use touchup_geometry::numeric::PointGrid;
 
-/// Number of parts of the side of a drawn face.
-const PARTS: usize = 6;
+/// Maximum number of parts of the side of a drawn face, and their minimum size, as a share of the
+/// diagonal of the mesh.
+const PARTS: f64 = 6.0;
+const PART: f64 = 0.003;
 /// Gap between pieces of one wall: in radii of the ball, in median edges of a measured mesh, and in a
 /// drawing, m.
 const GAP_RADII: f64 = 4.0;
 const GAP_EDGES: f64 = 4.0;
-const GAP_DRAWN: f64 = 1e-6;
+const GAP_DRAWN: f64 = 2e-5;
 /// Half of the extent of a contact, in radii of the ball.
 const HALF_CONTACT: f64 = 0.1;
 /// Components of a wall's normal along an axis: 6°; with contacts, which may lie along one edge, 16°.
@@ -124,8 +128,8 @@ impl<'a> SegmentEvidence<'a> {
                 segment: number,
                 at,
                 normal,
-                span: [f64::INFINITY, f64::NEG_INFINITY],
-                height: [f64::INFINITY, f64::NEG_INFINITY],
+                span: NOTHING,
+                height: NOTHING,
             };
             pieces.extend(self.parts(whole, axis, basis));
         }
@@ -142,34 +146,68 @@ impl<'a> SegmentEvidence<'a> {
         let along = whole.along();
         let along = basis[0] * along.x + basis[1] * along.y;
         let origin = (basis[0] * whole.at.x + basis[1] * whole.at.y).dot(&along);
-        let mut places: Vec<(f64, f64, f64)> = self.of_segment[whole.segment]
-            .iter()
-            .map(|one| {
-                let v = one.point.coords;
-                (v.dot(&along) - origin, v.dot(axis), one.half)
-            })
-            .collect();
-        places.sort_by(|a, b| (a.0 - a.2).total_cmp(&(b.0 - b.2)));
+        let gap = self.gap[whole.segment];
+        // places of a drawn face reach its corners
+        let reach = if self.parted.rounding.is_some() {
+            0.0
+        } else {
+            1.0
+        };
+        // places that begin within a gap are of one piece
+        let mut bins: BTreeMap<i64, WallSpan> = BTreeMap::new();
+        for one in &self.of_segment[whole.segment] {
+            let v = one.point.coords;
+            let (x, z, half) = (v.dot(&along) - origin, v.dot(axis), one.half);
+            let bin = bins.entry(((x - half) / gap).floor() as i64);
+            let span = bin.or_insert(WallSpan::EMPTY);
+            span.begin = span.begin.min(x - half);
+            span.end = span.end.max(x + half);
+            span.span = widened(span.span, x, reach * half);
+            span.height = widened(span.height, z, reach * half);
+        }
         let mut parts: Vec<WallPiece> = Vec::new();
         let mut last = f64::NEG_INFINITY;
-        for (x, z, half) in places {
-            if x - half > last + self.gap[whole.segment] {
+        for span in bins.values() {
+            if span.begin > last + gap {
                 parts.push(WallPiece { ..whole });
             }
-            last = last.max(x + half);
-            // places of a drawn face reach its corners
-            let half = if self.parted.rounding.is_some() {
-                0.0
-            } else {
-                half
-            };
+            last = last.max(span.end);
             if let Some(part) = parts.last_mut() {
-                part.span = [part.span[0].min(x - half), part.span[1].max(x + half)];
-                part.height = [part.height[0].min(z - half), part.height[1].max(z + half)];
+                part.span = joined(part.span, span.span);
+                part.height = joined(part.height, span.height);
             }
         }
         parts
     }
+}
+
+/// Extent of places of a wall along it.
+struct WallSpan {
+    /// with the extent of each place, m
+    begin: f64,
+    end: f64,
+    /// ranges along the wall and along the axis, m
+    span: [f64; 2],
+    height: [f64; 2],
+}
+
+impl WallSpan {
+    const EMPTY: Self = Self {
+        begin: f64::INFINITY,
+        end: f64::NEG_INFINITY,
+        span: NOTHING,
+        height: NOTHING,
+    };
+}
+
+const NOTHING: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];
+
+fn widened([low, high]: [f64; 2], x: f64, half: f64) -> [f64; 2] {
+    [low.min(x - half), high.max(x + half)]
+}
+
+fn joined(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+    [a[0].min(b[0]), a[1].max(b[1])]
 }
 
 fn evidence_of(parted: &SegmentedMesh, number: usize, radius: f64) -> Vec<SegmentPlace> {
@@ -187,10 +225,12 @@ fn evidence_of(parted: &SegmentedMesh, number: usize, radius: f64) -> Vec<Segmen
             all.push(place(a + ((b - a) + (c - a)) / 3.0, size / 3.0));
             continue;
         }
-        for (i, k) in (0..=PARTS).flat_map(|i| (0..=PARTS - i).map(move |k| (i, k))) {
-            let [u, v] = [i, k].map(|at| at as f64 / PARTS as f64);
+        let parts = (size / (PART * parted.diagonal)).ceil().clamp(1.0, PARTS);
+        let last = parts as usize;
+        for (i, k) in (0..=last).flat_map(|i| (0..=last - i).map(move |k| (i, k))) {
+            let [u, v] = [i, k].map(|at| at as f64 / parts);
             let point = a + (b - a) * u + (c - a) * v;
-            all.push(place(point, size / (2 * PARTS) as f64));
+            all.push(place(point, size / (2.0 * parts)));
         }
     }
     all.extend(felt_places(parted, number, radius));

@@ -166,12 +166,16 @@ impl Void<'_> {
             .all(|&wall| self.view.evidence.is_felt(wall))
     }
 
-    /// Number of the places of a segment within a part of the void.
-    fn places(&self, number: usize, is_there: impl Fn(&Vector3<f64>, f64) -> bool) -> usize {
+    /// Whether a part of the void holds some places of a segment.
+    fn has_places(
+        &self,
+        least: usize,
+        number: usize,
+        is_there: impl Fn(&Vector3<f64>, f64) -> bool,
+    ) -> bool {
         let places = self.view.evidence.of_segment[number].iter();
-        places
-            .filter(|one| is_there(&self.local(&one.point), one.half))
-            .count()
+        let there = places.filter(|one| is_there(&self.local(&one.point), one.half));
+        there.take(least).count() == least
     }
 
     /// Whether contacts show material between the walls.
@@ -186,7 +190,7 @@ impl Void<'_> {
             !self.walls.contains(&number)
                 && self.view.evidence.is_felt(number)
                 && normal.dot(&self.across).abs() > ISLAND_NORMAL
-                && self.places(number, is_between) >= LEAST_ISLAND
+                && self.has_places(LEAST_ISLAND, number, is_between)
         };
         (0..self.parted().segmentation.segments.len()).any(is_island)
     }
@@ -235,14 +239,14 @@ impl Void<'_> {
                     && (inner..farthest).contains(&(q.x * sign))
             };
             let is_in = |across: &std::ops::Range<f64>| {
-                self.places(number, |q, half| is_there(q, half, across)) >= LEAST_PLACES
+                self.has_places(LEAST_PLACES, number, |q, half| is_there(q, half, across))
             };
             let is_next = nearest > self.half - 0.5 * self.width && nearest < best.0;
-            let is_across = match end.shape {
+            let is_across = || match end.shape {
                 EndShape::Round => ROUND_SIDES.iter().all(is_in),
                 _ => is_in(&FLAT_END),
             };
-            if is_next && is_across {
+            if is_next && is_across() {
                 best = (nearest, end);
             }
         }
@@ -352,7 +356,7 @@ impl Void<'_> {
             let down = self.parted().exit(number, &self.middle, &-out)?;
             let is_floor = normal.dot(out) > LEVEL
                 && (0.0..lowest).contains(&down)
-                && self.places(number, is_there) >= LEAST_PLACES;
+                && self.has_places(LEAST_PLACES, number, is_there);
             is_floor.then_some((number, down))
         };
         let floors = self.parted().planes().filter_map(floor);
@@ -397,29 +401,46 @@ impl Void<'_> {
         }
     }
 
-    /// The slot or pocket with these ends: along it, and against.
-    pub(super) fn slot(&self, ends: [VoidEnd; 2]) -> Option<Slot> {
-        let range = -ends[1].distance..ends[0].distance;
-        let middle = self.middle + self.along * ((range.start + range.end) / 2.0);
-        let sides = [self.view.axis, -self.view.axis].map(|out| {
-            let floor = self
-                .floor(&-out, &range)
-                .map_or(f64::INFINITY, |floor| floor.1);
-            self.opening(out).filter(|one| one.distance < floor)
-        });
-        let depths = [[0, 1], [1, 0]].map(|[near, far]| {
+    /// The opening with the most land around it, of two the farther one from its bottom.
+    ///
+    /// - `sides`: openings along its axis, and against; a floor between closes them.
+    /// - `middle`: in its range along it, m, in O.
+    fn opened(
+        &self,
+        sides: [Option<VoidOpening>; 2],
+        middle: &Point3<f64>,
+        range: &std::ops::Range<f64>,
+    ) -> Option<(VoidOpening, Bottom)> {
+        let is_above_floors = |side: &VoidOpening| {
+            let floor = self.floor(&-side.out, range);
+            floor.is_none_or(|(_, distance)| side.distance < distance)
+        };
+        let sides = sides.map(|side| side.filter(is_above_floors));
+        let opened = [[0, 1], [1, 0]].map(|[near, far]| {
             let opening = sides[near]?;
-            let bottom = self.bottom(&middle, &opening.out, &range, sides[far].as_ref());
+            let bottom = self.bottom(middle, &opening.out, range, sides[far].as_ref());
             Some((opening, bottom))
         });
-        let better = |(a, below): &&(VoidOpening, Bottom), (b, other): &&(VoidOpening, Bottom)| {
+        let better = |(a, below): &(VoidOpening, Bottom), (b, other): &(VoidOpening, Bottom)| {
             let depths = [a.distance + below.distance, b.distance + other.distance];
             a.share
                 .total_cmp(&b.share)
                 .then(depths[0].total_cmp(&depths[1]))
         };
-        let (opening, bottom) = depths.iter().flatten().max_by(better)?;
-        if !self.is_free(opening) {
+        opened.into_iter().flatten().max_by(better)
+    }
+
+    /// The slot or pocket with its ends: along it, and against.
+    pub(super) fn slot(&self, ends: impl FnOnce(&Self) -> [VoidEnd; 2]) -> Option<Slot> {
+        let sides = [self.view.axis, -self.view.axis].map(|out| self.opening(out));
+        if sides.iter().all(Option::is_none) {
+            return None;
+        }
+        let ends = ends(self);
+        let range = -ends[1].distance..ends[0].distance;
+        let middle = self.middle + self.along * ((range.start + range.end) / 2.0);
+        let (opening, bottom) = self.opened(sides, &middle, &range)?;
+        if !self.is_free(&opening) {
             return None;
         }
         let out = opening.out;
