@@ -8,7 +8,7 @@
 //!
 //! | crate | modules |
 //! |---|---|
-//! | [`touchup_geometry`] | [`mesh`] [`form`]; units |
+//! | [`touchup_geometry`] | [`mesh`] [`form`] [`brep`]; units |
 //! | [`touchup_method`] | samples to mesh: [`stylus`] [`reconstruct`] [`haptic`]; frames |
 //! | [`touchup_features`] | [`features`] [`conformity`] [`align`] [`compare`] [`calibrate`] [`diagnose`] |
 //! | [`touchup_probing`] | [`probing::plan`] [`probing::arm`] [`probing::execute`] |
@@ -27,7 +27,7 @@
 struct MethodPage;
 
 pub use touchup_features::{align, calibrate, compare, conformity, diagnose, features};
-pub use touchup_geometry::{form, mesh};
+pub use touchup_geometry::{brep, form, mesh};
 pub use touchup_method::{haptic, reconstruct, stylus};
 pub use touchup_node::*;
 pub use touchup_probing as probing;

@@ -21,6 +21,7 @@ pub const MAY_USE: &[(&str, &str)] = &[
     ),
     ("sim", "numeric stylus mesh features calibrate diagnose arm"),
     ("form", "numeric"),
+    ("brep", "numeric"),
     ("features", "numeric stylus mesh form"),
     ("conformity", "numeric features"),
     ("align", "numeric mesh features"),
