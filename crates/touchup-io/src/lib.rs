@@ -4,6 +4,7 @@
 //! | module | files |
 //! |---|---|
 //! | [`mesh_file`] | meshes and point clouds: PLY, STL, OBJ, PCD, XYZ, E57 |
+//! | [`step_file`] | boundary representations: STEP |
 //! | [`recording`] | recordings of poses and wrenches: MCAP, rosbag2, ROS 1 bags, tables |
 //! | [`tables`] | tables of text: picked points, static poses |
 //! | [`features_file`], [`touches_file`], [`probed_touches_file`], [`result_table`] | measured features and touches |
@@ -69,6 +70,7 @@ pub mod result_table;
 mod scalar;
 pub mod scan_folder;
 pub mod session_folder;
+pub mod step_file;
 pub mod tables;
 pub mod text_file;
 pub mod touches_file;

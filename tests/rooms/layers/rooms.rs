@@ -30,7 +30,7 @@ pub const MAY_USE: &[(&str, &str)] = &[
     ("diagnose", "numeric stylus mesh"),
     (
         "io",
-        "numeric parameters stylus mesh form features conformity align arm execute",
+        "numeric parameters stylus mesh form brep features conformity align arm execute",
     ),
     ("scan", "mesh reconstruct io threads"),
     (
