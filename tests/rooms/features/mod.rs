@@ -1,3 +1,4 @@
+mod boundary;
 mod command;
 mod curvature;
 mod detection;

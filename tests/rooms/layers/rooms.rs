@@ -22,7 +22,7 @@ pub const MAY_USE: &[(&str, &str)] = &[
     ("sim", "numeric stylus mesh features calibrate diagnose arm"),
     ("form", "numeric"),
     ("brep", "numeric"),
-    ("features", "numeric stylus mesh form"),
+    ("features", "numeric stylus mesh form brep"),
     ("conformity", "numeric features"),
     ("align", "numeric mesh features"),
     ("compare", "numeric stylus mesh align features"),

@@ -3,6 +3,7 @@
 use nalgebra::{Matrix3, Point3, Vector3};
 
 use super::borders::{Borders, StraightEdge, borders, straight_edges, without_seams};
+use super::boundary::{PartBoundary, PartFeatures, boundary};
 use super::cones::add_cones;
 use super::feature::{Feature, FeatureKind, FittedTo, Form, MeasuredValue, Walls};
 use super::fit::{Fit, Freedom, Plane, Stadium, SurfaceModel, TouchNoise};
@@ -30,9 +31,6 @@ pub struct Detection {
     pub noise: TouchNoise,
 }
 
-/// Minimum width of a reported plane, in tolerances.
-const SURE_WIDTH: f64 = 25.0;
-
 /// Diameter of the ball's own path in the coarse mesh, in diameters of the ball.
 const OF_BALL: std::ops::Range<f64> = 0.97..1.12;
 /// Maximum distance of a ball's centre from the axis of its path, in diameters, and minimum number of
@@ -46,6 +44,20 @@ const LEAST_IN_PATH: usize = 3;
 ///
 /// - `touches`: as in [`touchup_method::reconstruct::Patcher::probed`]; features refer to them by index.
 pub fn detect(mesh: &TriMesh, touches: &[ProbedPoint]) -> Detection {
+    detected(mesh, touches, |_, _| ()).0
+}
+
+/// As [`detect`], with the boundary of the part.
+pub fn detect_boundary(mesh: &TriMesh, touches: &[ProbedPoint]) -> (Detection, PartBoundary) {
+    detected(mesh, touches, boundary)
+}
+
+/// Detects features, and derives something else from the same segments.
+fn detected<T>(
+    mesh: &TriMesh,
+    touches: &[ProbedPoint],
+    derive: impl FnOnce(&Measure, &PartFeatures) -> T,
+) -> (Detection, T) {
     let numbered = (!touches.is_empty()).then(|| numbered_by_place(mesh));
     let mesh = numbered.as_ref().unwrap_or(mesh);
     let tree = FaceTree::new(mesh);
@@ -92,15 +104,21 @@ pub fn detect(mesh: &TriMesh, touches: &[ProbedPoint]) -> Detection {
     features.extend(edges.iter().filter_map(|edge| edge_feature(&measure, edge)));
     features.extend(corners(&parted, &measure, &edges));
     features.extend(plane_features(&measure));
-    features
-        .iter_mut()
-        .enumerate()
-        .for_each(|(id, feature)| feature.id = id as u32);
-    Detection {
+    for (id, feature) in features.iter_mut().enumerate() {
+        feature.id = id as u32;
+    }
+    let detection = Detection {
         features,
         unexplained: unexplained(&parted),
         noise: observed.noise,
-    }
+    };
+    let of_part = PartFeatures {
+        walls: &walls,
+        holes: &holes,
+        bosses: &bosses,
+        slots: &flat,
+    };
+    (detection, derive(&measure, &of_part))
 }
 
 /// Holes that are no end of a slot, and slots of which no end is a bore with contacts all around.
@@ -125,11 +143,7 @@ fn without_ends(
 
 /// Straight edges between sure planes.
 fn sure_edges(parted: &SegmentedMesh, borders: &Borders) -> Vec<StraightEdge> {
-    let is_sure = |edge: &StraightEdge| {
-        edge.planes
-            .iter()
-            .all(|&number| is_sure_plane(parted, number))
-    };
+    let is_sure = |edge: &StraightEdge| edge.planes.iter().all(|&number| parted.is_sure(number));
     straight_edges(parted, borders)
         .into_iter()
         .filter(is_sure)
@@ -161,7 +175,7 @@ fn plane_features(measure: &Measure) -> Vec<Feature> {
     let is_large = |number: usize| parted.is_large(parted.segment(number).area);
     parted
         .planes()
-        .filter(|&(number, ..)| is_sure_plane(parted, number) && is_large(number))
+        .filter(|&(number, ..)| parted.is_sure(number) && is_large(number))
         .filter_map(|(number, ..)| plane_feature(measure, number))
         .collect()
 }
@@ -338,11 +352,6 @@ fn is_slot_end(wall: &Wall, slots: &[Slot]) -> bool {
 
 /// Maximum difference of width and place between a slot and its end wall, in widths.
 const ALIKE: f64 = 0.2;
-
-fn is_sure_plane(parted: &SegmentedMesh, number: usize) -> bool {
-    let segment = parted.segment(number);
-    segment.is_exact || segment.area > (SURE_WIDTH * segment.tolerance).powi(2)
-}
 
 /// Intersection of an axis with a surface, or end of the axis.
 #[derive(Clone, Debug, Default)]

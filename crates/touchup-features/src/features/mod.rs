@@ -5,6 +5,7 @@
 //! its [`clusters`] are the paper's method for the places of features.
 
 mod borders;
+mod boundary;
 mod cones;
 mod detect;
 mod elements;
@@ -25,7 +26,8 @@ mod track;
 mod voids;
 mod walls;
 
-pub use detect::{Detection, detect};
+pub use boundary::PartBoundary;
+pub use detect::{Detection, detect, detect_boundary};
 pub use feature::{Feature, FeatureKind, FittedTo, Form, MeasuredValue, Walls};
 pub use from_fits::End;
 pub use measure::{LEAST_TOUCHES, LEAST_TURN};

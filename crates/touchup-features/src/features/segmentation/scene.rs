@@ -34,6 +34,8 @@ const AROUND: usize = 24;
 const LEAST_AREA: f64 = 1e-5;
 /// Minimum area of a plane or a shaft to report, in squared diagonals.
 const LARGE_AREA: f64 = 1e-3;
+/// Minimum width of a segment to report untouched, in tolerances.
+const SURE_WIDTH: f64 = 25.0;
 /// A plane around an opening is square to the axis within 20°.
 const SQUARE: f64 = 0.94;
 
@@ -123,6 +125,12 @@ impl<'a> SegmentedMesh<'a> {
     /// Whether a surface of this area, m², is large enough to report.
     pub(crate) fn is_large(&self, area: f64) -> bool {
         area > LARGE_AREA * self.diagonal * self.diagonal
+    }
+
+    /// Whether a segment is wide enough beside its tolerance to report untouched.
+    pub(crate) fn is_sure(&self, number: usize) -> bool {
+        let segment = self.segment(number);
+        segment.is_exact || segment.area > (SURE_WIDTH * segment.tolerance).powi(2)
     }
 
     /// The plane of a segment, if flat.
