@@ -138,6 +138,7 @@ pub(super) fn demo_robot(out: &Path, seed: u64) -> Result<Losses, CliError> {
         is_simulated: true,
         is_forced: false,
         out,
+        step: None,
     };
     let spheres = SPHERES.map(|centre| ReferenceSphere {
         centre: Point3::from(Vector3::from(centre) / 1e3),
@@ -156,8 +157,7 @@ pub(super) fn demo_robot(out: &Path, seed: u64) -> Result<Losses, CliError> {
     write_scene(&scene)?;
 
     let ready = probing.ready()?;
-    let now = arm.next_state().map_err(CliError::arm)?;
-    probing.planned(&ready, &now)?;
+    probing.planned(&ready, &arm.next_state().map_err(CliError::arm)?)?;
     // nothing real moves: a signal ends this as any other verb
     let ProbingOutcome {
         summary,

@@ -7,7 +7,7 @@ use std::time::Instant;
 use clap::{Args, ValueEnum};
 
 use super::common::progress::WorkProgress;
-use super::{CliError, Losses, check_kept, counted, print_report, require};
+use super::{CliError, Losses, check_kept_by, counted, print_report, require};
 use touchup_features::features::curvature;
 use touchup_features::features::{Cluster, ClusterParams, PaperParams, clusters, paper_clusters};
 use touchup_features::features::{Detection, Feature, FeatureKind, FittedTo, Form, MeasuredValue};
@@ -17,7 +17,7 @@ use touchup_io::mesh_file::MeshUnit;
 use touchup_io::result_table::write_features_as_named;
 use touchup_io::touches_file::read_touches;
 use touchup_session::scan::{Scan, read_scan};
-use touchup_session::session::found;
+use touchup_session::session::{found, found_with_boundary, write_boundary};
 
 #[derive(Debug, Args)]
 pub(super) struct FeaturesArguments {
@@ -42,6 +42,10 @@ pub(super) struct FeaturesArguments {
     /// Output: the features as JSON, or as a table, .csv or .parquet
     #[arg(long, value_name = "FEATURES")]
     out: Option<PathBuf>,
+    /// Output: the faces as a STEP file (AP242) for CAD programs: planes, cylinders and cones,
+    /// trimmed where they meet
+    #[arg(long, value_name = "STEP")]
+    step: Option<PathBuf>,
     /// Prints the features as JSON
     #[arg(long)]
     json: bool,
@@ -59,10 +63,11 @@ enum FeaturesMode {
 /// Runs `touchup features`: finds, and prints the result.
 pub(super) fn features(arguments: &FeaturesArguments) -> Result<Losses, CliError> {
     arguments.check()?;
-    if let Some(out) = &arguments.out {
-        check_kept("MESH", &arguments.mesh, out)?;
+    for (flag, out) in [("--out", &arguments.out), ("--step", &arguments.step)] {
+        let Some(out) = out else { continue };
+        check_kept_by(flag, "MESH", &arguments.mesh, out)?;
         if let Some(touches) = &arguments.touches {
-            check_kept("--touches", touches, out)?;
+            check_kept_by(flag, "--touches", touches, out)?;
         }
     }
     let Scan { mesh, repair, .. } = read_scan(&arguments.mesh, arguments.mesh_unit)?;
@@ -71,25 +76,34 @@ pub(super) fn features(arguments: &FeaturesArguments) -> Result<Losses, CliError
         .as_deref()
         .map_or_else(|| Ok(Vec::new()), read_touches)?;
     let started = Instant::now();
-    let (table, file) = match arguments.mode {
-        FeaturesMode::Fitted => {
+    let (table, file, boundary) = match (arguments.mode, &arguments.step) {
+        (FeaturesMode::Fitted, None) => {
             let _finding = WorkProgress::stage("find features");
             let (detection, file) = found(&mesh, &touches);
-            (feature_table(&detection), file)
+            (feature_table(&detection), file, None)
         }
-        FeaturesMode::Paper => {
+        (FeaturesMode::Fitted, Some(step)) => {
+            let _finding = WorkProgress::stage("find features and faces");
+            let (detection, file, boundary) = found_with_boundary(&mesh, &touches);
+            (feature_table(&detection), file, Some((step, boundary)))
+        }
+        (FeaturesMode::Paper, _) => {
             let file = FeatureFile::of_clusters(&arguments.find_clusters(&mesh));
-            (cluster_table(&file), file)
+            (cluster_table(&file), file, None)
         }
     };
     let took_s = started.elapsed().as_secs_f64();
     if let Some(out) = &arguments.out {
         write_features_as_named(out, &file)?;
     }
-    let wrote = arguments
+    let mut wrote = arguments
         .out
         .as_ref()
         .map_or(String::new(), |out| format!("\nwrote {}", out.display()));
+    if let Some((step, boundary)) = boundary {
+        let summary = write_boundary(step, &boundary)?;
+        wrote += &format!("\nwrote {}: {summary}", step.display());
+    }
     print_report(arguments.json, &file, || {
         format!("mesh: {repair}\n{table}\nfound in {took_s:.2} s{wrote}")
     })?;
@@ -108,6 +122,10 @@ impl FeaturesArguments {
         require(
             self.touches.is_none() || !is_paper,
             "--touches measures features, and --mode paper has none",
+        )?;
+        require(
+            self.step.is_none() || !is_paper,
+            "--step writes fitted faces, and --mode paper has none",
         )?;
         require(is_above_0, "--threshold-per-mm2 must be above 0")
     }

@@ -89,6 +89,10 @@ pub(super) struct ProbeArguments {
     /// refined.ply, features.json, touches.csv, touches.png
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+    /// Output: the faces of the refined mesh as a STEP file (AP242) for CAD programs, as of
+    /// `touchup refine --step`
+    #[arg(long, value_name = "STEP", conflicts_with = "dry_run")]
+    step: Option<PathBuf>,
     /// Prints the result as one JSON object
     #[arg(long)]
     json: bool,
@@ -106,6 +110,7 @@ pub(super) fn probe(arguments: &ProbeArguments) -> Result<Losses, CliError> {
         is_simulated: *robot == RobotName::Sim,
         is_forced: arguments.force,
         out: &arguments.out,
+        step: arguments.step.as_deref(),
     };
     let mut ready = probing.ready()?;
     arguments.narrow(&mut ready, &flags)?;

@@ -68,6 +68,10 @@ pub(super) struct RefineArguments {
     /// Output: touches, which the features refer to: .csv or .parquet
     #[arg(long, value_name = "TOUCHES")]
     touches_out: Option<PathBuf>,
+    /// Output: the faces of the refined mesh as a STEP file (AP242) for CAD programs: planes,
+    /// cylinders and cones, measured by the touches, trimmed where they meet
+    #[arg(long, value_name = "STEP")]
+    step: Option<PathBuf>,
     /// Session folder of the node, even after a crash: source of scan, scene and touches, and
     /// target of refined.ply, features.json and touches.csv unless flags give their paths
     #[arg(long, value_name = "SESSION", conflicts_with_all = ["scan", "bag", "scene", "mesh_unit", "wrench_topic", "pose_topic", "pose_frame", "markers_topic"])]
@@ -187,6 +191,7 @@ impl RefineArguments {
             out,
             features_out,
             touches_out,
+            step,
             registration,
             force,
             verbose,
@@ -205,6 +210,7 @@ impl RefineArguments {
         Self {
             features_out,
             touches_out,
+            step,
             ..session
         }
         .completed()
@@ -246,6 +252,7 @@ impl RefineArguments {
                 mesh: self.out.clone(),
                 features: self.features_out.clone(),
                 touches: self.touches_out.clone(),
+                step: self.step.clone(),
             },
         };
         let options = RefinementOptions {
@@ -271,18 +278,14 @@ impl RefineArguments {
             ("--out", Some(&self.out)),
             ("--features-out", self.features_out.as_ref()),
             ("--touches-out", self.touches_out.as_ref()),
+            ("--step", self.step.as_ref()),
         ];
         let inputs = [
             ("--scan", Some(&self.scan)),
             ("--bag", Some(&self.bag)),
             ("--scene", self.scene.as_ref()),
         ];
-        let [outputs, inputs] = [outputs, inputs].map(|files| {
-            let named = files
-                .into_iter()
-                .filter_map(|(flag, path)| Some((flag, path?)));
-            named.collect::<Vec<_>>()
-        });
+        let (outputs, inputs) = (named(outputs), named(inputs));
         for (at, (flag, out)) in outputs.iter().enumerate() {
             if let Some((other, _)) = outputs[..at]
                 .iter()
@@ -310,4 +313,14 @@ impl RefineArguments {
         }
         Ok((scene, told))
     }
+}
+
+/// Files that are named, each with its flag.
+fn named<'a, const N: usize>(
+    files: [(&'static str, Option<&'a PathBuf>); N],
+) -> Vec<(&'static str, &'a PathBuf)> {
+    let named = files
+        .into_iter()
+        .filter_map(|(flag, path)| Some((flag, path?)));
+    named.collect()
 }

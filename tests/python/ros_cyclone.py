@@ -204,6 +204,7 @@ class SaveMeshRequest:
     name: str
     overwrite: bool
     with_features: bool
+    with_step: bool
 
 
 @message("touchup_msgs/srv/SaveMesh_Response")

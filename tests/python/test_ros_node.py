@@ -151,7 +151,7 @@ def played(demo_folder, begun, tmp_path_factory, touchup_bin):
                 follower.tick()
                 ticked = time.monotonic()
 
-        assert not save.introduce("../nowhere.ply", False, False).success
+        assert not save.introduce("../nowhere.ply", False, False, False).success
         resync.introduce("", 0)
         for _ in in_step(node, begun, domain):
             follow(0.1)
@@ -159,7 +159,7 @@ def played(demo_folder, begun, tmp_path_factory, touchup_bin):
 
         def is_saved():
             follow()
-            answers.append(save.ask(f"try{len(answers)}.ply", False, False))
+            answers.append(save.ask(f"try{len(answers)}.ply", False, False, False))
             return answers[-1].mesh_version == follower.version != 0 and not follower.is_waiting
 
         node.wait_for(is_saved)

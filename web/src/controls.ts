@@ -42,7 +42,7 @@ export class Controls {
   }
 
   private async save(): Promise<void> {
-    const request = { overwrite: true, with_features: true };
+    const request = { overwrite: true, with_features: true, with_step: true };
     await this.operating.call<Saved>("~/save_mesh", request, (answer) => t("saved", { path: answer.path }));
   }
 

@@ -19,7 +19,7 @@ use touchup_session::refinement::{
 };
 use touchup_session::replay::RecordedAs;
 use touchup_session::scene::{LeftOut, Memory, Scene, SceneCost};
-use touchup_session::session::ResultFiles;
+use touchup_session::session::{ResultFiles, StepSummary};
 
 /// Input and output files of a refinement.
 #[derive(Clone, Debug)]
@@ -44,6 +44,9 @@ pub(in crate::cli) struct RefineSummary {
     cloud: Option<CloudSummary>,
     #[serde(flatten)]
     refinement: RefinementSummary,
+    /// Faces of the STEP file; absent without one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    step: Option<StepSummary>,
     load_s: f64,
     replay_s: f64,
 }
@@ -120,13 +123,15 @@ impl RefinementFiles {
             .findings
             .iter()
             .for_each(|finding| warn!("{finding}"));
-        self.out.write(mesh, &self.scan, self.mesh_unit)?;
+        let written = self.out.write(mesh, &self.scan, self.mesh_unit)?;
+        let step = written.transpose()?;
         drop(stage);
         let summary = RefineSummary {
             scene,
             told,
             cloud,
             refinement,
+            step,
             load_s,
             replay_s,
         };
@@ -210,8 +215,12 @@ impl fmt::Display for RefineSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}\n{}", self.refinement.verdict(), self.told)?;
         match self.refinement.to_string() {
-            further if further.is_empty() => Ok(()),
-            further => write!(f, "\n{further}"),
+            further if further.is_empty() => {}
+            further => write!(f, "\n{further}")?,
+        }
+        match &self.step {
+            Some(step) => write!(f, "\nSTEP: {step}"),
+            None => Ok(()),
         }
     }
 }

@@ -52,6 +52,8 @@ pub(super) struct Probing<'a> {
     /// Whether to write the mesh despite sure findings.
     pub is_forced: bool,
     pub out: &'a Path,
+    /// STEP file, if requested.
+    pub step: Option<&'a Path>,
 }
 
 /// Results of a probing.
@@ -261,7 +263,9 @@ impl Probing<'_> {
     fn refined(&self, touches: &[TouchLine]) -> Result<RefinementResult, CliError> {
         let (scene, told) = ToldFlags::default().scene(Some(self.scene))?;
         let recorded = RecordedAs::from(probe_topics());
-        let files = RefinementFiles::in_folder(self.scan, self.unit, self.out, RECORDING, recorded);
+        let mut files =
+            RefinementFiles::in_folder(self.scan, self.unit, self.out, RECORDING, recorded);
+        files.out.step = self.step.map(Path::to_owned);
         let options = RefinementOptions {
             // an arm without any contact has no measurement that could be wrong: each feature says
             // why

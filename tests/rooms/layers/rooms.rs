@@ -41,7 +41,7 @@ pub const MAY_USE: &[(&str, &str)] = &[
     ("replay", "numeric stylus io scene"),
     (
         "session",
-        "clock numeric stylus mesh reconstruct haptic live features io threads scan replay",
+        "clock numeric stylus mesh brep reconstruct haptic live features io threads scan replay",
     ),
     (
         "refinement",

@@ -332,12 +332,18 @@ impl RefinementWorker {
                     EngineResult::Moved(mesh.map_err(|why| why.to_string())?.into())
                 }
             };
-            let outcome = write_result(&setup, result, &files);
-            let [vertices, faces] = outcome.map_err(|why| why.to_string())?.counts;
+            let written = write_result(&setup, result, &files);
+            let (outcome, step) = written.map_err(|why| why.to_string())?;
+            let [vertices, faces] = outcome.counts;
             let path = files.mesh.display().to_string();
+            let (success, faces_in_words) = match step {
+                None => (true, String::new()),
+                Some(Ok(step)) => (true, format!(", and a STEP file: {step}")),
+                Some(Err(why)) => (false, format!(", and no STEP file: {why}")),
+            };
             Ok(SaveMeshResponse {
-                success: true,
-                message: format!("wrote {path}"),
+                success,
+                message: format!("wrote {path}{faces_in_words}"),
                 path,
                 mesh_version,
                 vertex_count: vertices as u32,
@@ -398,6 +404,10 @@ fn files_of(folder: &SessionFolder, request: &SaveMeshRequest) -> Result<ResultF
     Ok(ResultFiles {
         features: beside(ResultFiles::FEATURES)?,
         touches: beside(ResultFiles::TOUCHES)?,
+        step: request
+            .with_step
+            .then(|| place(&format!("{stem}.step")))
+            .transpose()?,
         mesh,
     })
 }

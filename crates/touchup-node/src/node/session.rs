@@ -19,7 +19,7 @@ use touchup_method::stylus::{Synchroniser, WrenchFrame};
 use touchup_session::live::{Engine, EngineResult, Gate, Latencies, Pace, Quantiles, TouchDelta};
 use touchup_session::session::{
     Outcome, OutcomeError, RecordingLoss, RefinedMesh, ResultFiles, SessionRecord, SessionRecorder,
-    StrokeChanges,
+    StepOutcome, StrokeChanges,
 };
 
 /// Numbers of accepted, refused and skipped input.
@@ -266,7 +266,7 @@ impl NodeSession {
         report.unrecorded = messages;
         let result = engine.finish()?.into_result();
         let files = ResultFiles::in_folder(folder.path());
-        let outcome = write_result(setup, result, &files).inspect_err(|_| {
+        let (outcome, _) = write_result(setup, result, &files).inspect_err(|_| {
             if let Some(reason) = &reason {
                 tracing::error!("{messages} messages are not in the session's recording: {reason}");
             }
@@ -354,7 +354,8 @@ fn engine_of(setup: &Setup, axes: WrenchFrame) -> Result<Engine, NodeError> {
     Ok(engine)
 }
 
-/// Writes the files of a result, as `touchup refine` does.
+/// Writes the files of a result, as `touchup refine` does; returns the faces of the STEP file or its
+/// fault beside it.
 ///
 /// # Errors
 /// [`OutcomeError`]
@@ -362,11 +363,11 @@ pub fn write_result(
     setup: &Setup,
     result: EngineResult,
     files: &ResultFiles,
-) -> Result<Outcome, Box<OutcomeError>> {
+) -> Result<(Outcome, Option<StepOutcome>), Box<OutcomeError>> {
     let outside = setup.input.cut.outside.as_ref();
     let (mesh, outcome) = RefinedMesh::of(&setup.input.scan, result, outside, false)?;
-    files.write(mesh, &setup.scan_path, setup.mesh_unit)?;
-    Ok(outcome)
+    let step = files.write(mesh, &setup.scan_path, setup.mesh_unit)?;
+    Ok((outcome, step))
 }
 
 /// "2026-11-20T22-14-10Z": sorts by time, and is a file name everywhere.

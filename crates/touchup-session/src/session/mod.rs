@@ -8,13 +8,15 @@ mod outcome;
 mod outliers;
 mod record;
 mod remade;
+mod step_result;
 mod strokes;
 
 pub use outcome::{
-    Origins, Outcome, OutcomeError, PatchSummary, RefinedMesh, ResultFiles, found, moved_faces,
-    origins, sewn,
+    Origins, Outcome, OutcomeError, PatchSummary, RefinedMesh, ResultFiles, found,
+    found_with_boundary, moved_faces, origins, sewn,
 };
 pub use outliers::UncertaintySummary;
 pub use record::{RecordingLoss, SessionError, SessionFacts, SessionRecord, SessionRecorder};
 pub use remade::{EvidenceSource, RemakeError};
+pub use step_result::{StepError, StepOutcome, StepSummary, write_boundary};
 pub use strokes::{Removal, StrokeChange, StrokeChanges, StrokeHistory, StrokeReplay, UndoStep};

@@ -9,10 +9,11 @@ use serde::Serialize;
 use tracing::{debug, warn};
 
 use super::outliers::UncertaintySummary;
+use super::step_result::{StepOutcome, write_boundary};
 use crate::live::EngineResult;
 use crate::reported;
 use crate::scan::carried_over;
-use touchup_features::features::{Detection, detect};
+use touchup_features::features::{Detection, PartBoundary, detect, detect_boundary};
 use touchup_geometry::mesh::{FaceId, FaceTree, MeshError, MeshRemainder, TriMesh, VertexId};
 use touchup_geometry::numeric::counted;
 use touchup_io::features_file::FeatureFile;
@@ -56,6 +57,8 @@ pub struct ResultFiles {
     pub features: Option<PathBuf>,
     /// the touches of the features: Parquet for a name in `.parquet`, else CSV; `None`: not written
     pub touches: Option<PathBuf>,
+    /// STEP file of the trimmed faces; `None`: not written
+    pub step: Option<PathBuf>,
 }
 
 /// Result on the touched part.
@@ -109,6 +112,16 @@ pub fn found(mesh: &TriMesh, touches: &[ProbedPoint]) -> (Detection, FeatureFile
     let detection = detect(mesh, touches);
     let file = FeatureFile::of(&detection.features, detection.unexplained);
     (detection, file)
+}
+
+/// As [`found`], with the boundary of the part.
+pub fn found_with_boundary(
+    mesh: &TriMesh,
+    touches: &[ProbedPoint],
+) -> (Detection, FeatureFile, PartBoundary) {
+    let (detection, boundary) = detect_boundary(mesh, touches);
+    let file = FeatureFile::of(&detection.features, detection.unexplained);
+    (detection, file, boundary)
 }
 
 /// Faces that are new, or with a moved corner.
@@ -336,16 +349,17 @@ impl ResultFiles {
     /// Name of the touches there.
     pub const TOUCHES: &str = "touches.csv";
 
-    /// All files, in a folder of results.
+    /// Mesh, features and touches in a folder of results.
     pub fn in_folder(folder: &Path) -> Self {
         Self {
             mesh: folder.join(Self::MESH),
             features: Some(folder.join(Self::FEATURES)),
             touches: Some(folder.join(Self::TOUCHES)),
+            step: None,
         }
     }
 
-    /// Writes mesh, touches and features.
+    /// Writes mesh, touches and features, then the STEP file, whose faces or fault it returns.
     ///
     /// - `scan`: file of the scan, source of colours and texture coordinates.
     /// - `unit`: unit of the coordinates in its file and in the mesh's.
@@ -357,7 +371,7 @@ impl ResultFiles {
         refined: RefinedMesh,
         scan: &Path,
         unit: MeshUnit,
-    ) -> Result<(), OutcomeError> {
+    ) -> Result<Option<StepOutcome>, OutcomeError> {
         let RefinedMesh {
             mesh,
             origins,
@@ -392,18 +406,32 @@ impl ResultFiles {
             .map_err(OutcomeError::WriteMesh)
     }
 
-    /// Writes the requested touches and features of the result: from the written mesh and touches,
-    /// so `touchup features` finds the same to the last bit.
-    fn write_features(&self, touches: &[ProbedPoint], unit: MeshUnit) -> Result<(), OutcomeError> {
+    /// Writes the requested touches, features and faces of the result: from the written mesh and
+    /// touches, so `touchup features` finds the same to the last bit.
+    fn write_features(
+        &self,
+        touches: &[ProbedPoint],
+        unit: MeshUnit,
+    ) -> Result<Option<StepOutcome>, OutcomeError> {
         if let Some(out) = &self.touches {
             write_touches_as_named(out, touches)?;
         }
-        if let Some(out) = &self.features {
-            let MeshFile { mesh, .. } =
-                read_mesh(&self.mesh, unit).map_err(OutcomeError::ReadMesh)?;
-            write_features_as_named(out, &found(&mesh, &as_written(touches)).1)?;
+        if self.features.is_none() && self.step.is_none() {
+            return Ok(None);
         }
-        Ok(())
+        let MeshFile { mesh, .. } = read_mesh(&self.mesh, unit).map_err(OutcomeError::ReadMesh)?;
+        let touches = as_written(touches);
+        let (file, boundary) = match &self.step {
+            Some(step) => {
+                let (_, file, boundary) = found_with_boundary(&mesh, &touches);
+                (file, Some((step, boundary)))
+            }
+            None => (found(&mesh, &touches).1, None),
+        };
+        if let Some(out) = &self.features {
+            write_features_as_named(out, &file)?;
+        }
+        Ok(boundary.map(|(step, boundary)| write_boundary(step, &boundary)))
     }
 }
 

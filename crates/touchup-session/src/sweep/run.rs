@@ -298,6 +298,7 @@ fn refined(
         mesh: claimed.path().join(ResultFiles::MESH),
         features: Some(features.clone()),
         touches: None,
+        step: None,
     };
     files
         .write(refined, scan, job.mesh_unit)

@@ -525,6 +525,25 @@ fn pause_undo_redo_and_reset() {
 }
 
 #[test]
+fn a_mesh_is_saved_into_the_folder_of_the_session_with_its_faces() {
+    let plate = Plate::touched(0.1);
+    let bench = Bench::start(&plate);
+    bench.feed(&plate.messages);
+    let folder = bench.node.folder().to_owned();
+    let with_faces = SaveMeshRequest {
+        name: "faces.ply".to_owned(),
+        with_step: true,
+        ..SaveMeshRequest::default()
+    };
+    let saved = bench.call(|reply| Call::Save(with_faces, reply));
+    let step = folder.join("faces.step");
+    // the touched plane has a face, or the answer says that nothing has
+    assert_eq!(saved.success, step.exists(), "{}", saved.message);
+    assert!(saved.message.contains("STEP"), "{}", saved.message);
+    assert!(saved.success && read(&folder, "faces.step").starts_with(b"ISO-10303-21;"));
+}
+
+#[test]
 fn a_mesh_is_saved_into_the_folder_of_the_session_and_nowhere_else() {
     let plate = Plate::touched(0.1);
     let bench = Bench::start(&plate);
@@ -535,6 +554,7 @@ fn a_mesh_is_saved_into_the_folder_of_the_session_and_nowhere_else() {
             name: name.to_owned(),
             overwrite,
             with_features: true,
+            with_step: false,
         };
         bench.call(|reply| Call::Save(request, reply))
     };
