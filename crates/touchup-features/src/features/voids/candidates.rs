@@ -8,8 +8,6 @@ use super::slot::Slot;
 use super::void::{LONG, Void, VoidEnd};
 use crate::features::walls::Wall;
 
-/// Walls that face each other are parallel within 6°.
-const PARALLEL: f64 = 0.9945;
 /// Minimum distance of two walls, in tolerances.
 const APART: f64 = 4.0;
 /// Minimum overlap of facing walls along the slot, as a share of the shorter one.
@@ -51,9 +49,15 @@ pub(super) fn axis_of_end(end: &Wall, known: &[Vector3<f64>]) -> Vector3<f64> {
 }
 
 impl AxisView<'_> {
+    /// Whether a half-round wall is along the axis.
+    fn is_along(&self, end: &Wall) -> bool {
+        end.axis.dot(&self.axis).abs() > ENDS_PARALLEL
+    }
+
     /// All voids beside flat walls.
     pub(super) fn beside_walls(&self, ends: &[&Wall]) -> Vec<Slot> {
-        let pieces = self.evidence.pieces(&self.axis, &self.basis);
+        let has_ends = ends.iter().any(|end| self.is_along(end));
+        let pieces = self.evidence.pieces(&self.axis, &self.basis, has_ends);
         let mut found = Vec::new();
         for (at, one) in pieces.iter().enumerate() {
             found.extend(
@@ -68,11 +72,7 @@ impl AxisView<'_> {
 
     /// The void between two flat walls.
     fn between(&self, one: &WallPiece, other: &WallPiece) -> Option<Slot> {
-        if one.normal.dot(&other.normal) > -PARALLEL {
-            return None;
-        }
-        let across = (one.normal - other.normal).try_normalize(0.0)?;
-        let width = (other.at - one.at).dot(&across);
+        let (across, width) = one.width_to(other)?;
         let along = Vector2::new(across.y, -across.x);
         let span = |wall: &WallPiece| {
             in_order(
@@ -123,8 +123,7 @@ impl AxisView<'_> {
         let v = centre - wall.at;
         let apex = self.flat(&end.towards).dot(&wall.along());
         let is_beside = (v.dot(&wall.normal) - end.radius()).abs() < ABOUT * width;
-        let is_parallel = end.axis.dot(&self.axis).abs() > ENDS_PARALLEL;
-        if !is_beside || !is_parallel || apex.abs() < AWAY {
+        if !is_beside || !self.is_along(end) || apex.abs() < AWAY {
             return None;
         }
         // from the end on
@@ -165,7 +164,7 @@ impl AxisView<'_> {
         let heights = ends.map(|end| self.heights(end));
         let shared = heights[0][1].min(heights[1][1]) - heights[0][0].max(heights[1][0]);
         let is_alike = (one.radius() - other.radius()).abs() < ABOUT * width
-            && other.axis.dot(&self.axis).abs() > ENDS_PARALLEL
+            && self.is_along(other)
             && shared > -ABOUT * width;
         if !is_alike || !is_apart(distance, width) {
             return None;

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::{Point2, Point3, Vector2, Vector3};
 
 use crate::features::segmentation::scene::SegmentedMesh;
+use touchup_geometry::mesh::Region;
 use touchup_geometry::numeric::PointGrid;
 
 /// Maximum number of parts of the side of a drawn face, and their minimum size, as a share of the
@@ -16,6 +17,8 @@ const PART: f64 = 0.003;
 const GAP_RADII: f64 = 4.0;
 const GAP_EDGES: f64 = 4.0;
 const GAP_DRAWN: f64 = 2e-5;
+/// Walls that face each other are parallel within 6°.
+const PARALLEL: f64 = 0.9945;
 /// Half of the extent of a contact, in radii of the ball.
 const HALF_CONTACT: f64 = 0.1;
 /// Components of a wall's normal along an axis: 6°; with contacts, which may lie along one edge, 16°.
@@ -46,6 +49,16 @@ impl WallPiece {
     pub(super) fn along(&self) -> Vector2<f64> {
         Vector2::new(self.normal.y, -self.normal.x)
     }
+
+    /// The unit vector across the void to a wall that faces this one, and its width, m.
+    pub(super) fn width_to(&self, other: &Self) -> Option<(Vector2<f64>, f64)> {
+        if self.normal.dot(&other.normal) > -PARALLEL {
+            return None;
+        }
+        let across = (self.normal - other.normal).try_normalize(0.0)?;
+        let width = (other.at - self.at).dot(&across);
+        (width > 0.0).then_some((across, width))
+    }
 }
 
 /// The evidence of a segmented mesh.
@@ -56,12 +69,15 @@ pub(super) struct SegmentEvidence<'a> {
     grid: PointGrid,
     /// gap between pieces of one surface, m, by segment
     gap: Vec<f64>,
+    /// box of the faces of each segment, seams included
+    bounds: Vec<Region>,
     /// radius of the ball, m
     pub radius: f64,
 }
 
 impl<'a> SegmentEvidence<'a> {
-    pub(super) fn of(parted: &'a SegmentedMesh<'a>, radius: f64) -> Self {
+    /// - `of_face`: the segment of each face, seams included.
+    pub(super) fn of(parted: &'a SegmentedMesh<'a>, of_face: &[u32], radius: f64) -> Self {
         let of_segment: Vec<Vec<SegmentPlace>> = (0..parted.segmentation.segments.len())
             .map(|number| evidence_of(parted, number, radius))
             .collect();
@@ -86,6 +102,7 @@ impl<'a> SegmentEvidence<'a> {
         Self {
             parted,
             gap: gap.collect(),
+            bounds: bounds(parted, of_face),
             of_segment,
             felt,
             grid,
@@ -102,44 +119,55 @@ impl<'a> SegmentEvidence<'a> {
         self.grid.near(p, reach).map(|number| &self.felt[number])
     }
 
+    /// Whether a place is within a distance, m, of the bounds of a segment.
+    pub(super) fn is_near(&self, number: usize, p: &Point3<f64>, distance: f64) -> bool {
+        self.bounds[number].grown(distance).contains(p)
+    }
+
     /// Whether a segment has contacts.
     pub(super) fn is_felt(&self, number: usize) -> bool {
         !self.parted.segment(number).felt.is_empty()
     }
 
-    /// The pieces of flat walls along an axis.
+    /// The pieces of flat walls along an axis, of walls that others face.
     ///
-    /// - `basis`: of the plane square to it.
-    pub(super) fn pieces(&self, axis: &Vector3<f64>, basis: &[Vector3<f64>; 2]) -> Vec<WallPiece> {
+    /// - `basis`: of the plane square to it; `has_ends`: whether half-round walls are along the axis,
+    ///   which may face any wall.
+    pub(super) fn pieces(
+        &self,
+        axis: &Vector3<f64>,
+        basis: &[Vector3<f64>; 2],
+        has_ends: bool,
+    ) -> Vec<WallPiece> {
         let flat = |v: &Vector3<f64>| Vector2::new(v.dot(&basis[0]), v.dot(&basis[1]));
-        let mut pieces = Vec::new();
-        for (number, point, normal) in self.parted.planes() {
+        let wall = |(number, point, normal): (usize, Point3<f64>, Vector3<f64>)| {
             let is_felt = self.is_felt(number);
             let square = if is_felt { SQUARE_FELT } else { SQUARE };
             let is_named = is_felt || self.parted.is_strong(number);
             if !is_named || normal.dot(axis).abs() > square {
-                continue;
+                return None;
             }
-            let Some(normal) = flat(&normal).try_normalize(0.0) else {
-                continue;
-            };
-            let at = Point2::from(flat(&point.coords));
-            let whole = WallPiece {
+            Some(WallPiece {
                 segment: number,
-                at,
-                normal,
+                at: Point2::from(flat(&point.coords)),
+                normal: flat(&normal).try_normalize(0.0)?,
                 span: NOTHING,
                 height: NOTHING,
-            };
-            pieces.extend(self.parts(whole, axis, basis));
-        }
-        pieces
+            })
+        };
+        let walls: Vec<WallPiece> = self.parted.planes().filter_map(wall).collect();
+        let is_faced =
+            |one: &&WallPiece| has_ends || walls.iter().any(|other| one.width_to(other).is_some());
+        let faced = walls.iter().filter(is_faced);
+        faced
+            .flat_map(|whole| self.parts(whole, axis, basis))
+            .collect()
     }
 
     /// The connected pieces of a wall.
     fn parts(
         &self,
-        whole: WallPiece,
+        whole: &WallPiece,
         axis: &Vector3<f64>,
         basis: &[Vector3<f64>; 2],
     ) -> Vec<WallPiece> {
@@ -169,7 +197,7 @@ impl<'a> SegmentEvidence<'a> {
         let mut last = f64::NEG_INFINITY;
         for span in bins.values() {
             if span.begin > last + gap {
-                parts.push(WallPiece { ..whole });
+                parts.push(WallPiece { ..*whole });
             }
             last = last.max(span.end);
             if let Some(part) = parts.last_mut() {
@@ -208,6 +236,20 @@ fn widened([low, high]: [f64; 2], x: f64, half: f64) -> [f64; 2] {
 
 fn joined(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
     [a[0].min(b[0]), a[1].max(b[1])]
+}
+
+/// Box of the faces of each segment.
+fn bounds(parted: &SegmentedMesh, of_face: &[u32]) -> Vec<Region> {
+    let [low, high] = NOTHING.map(|x| Point3::from(Vector3::repeat(x)));
+    let mut bounds = vec![Region { low, high }; parted.segmentation.segments.len()];
+    for (face, &number) in (0..).zip(of_face) {
+        if let Some(Region { low, high }) = bounds.get_mut(number as usize) {
+            for corner in parted.facets.triangle(face) {
+                (*low, *high) = (low.inf(&corner), high.sup(&corner));
+            }
+        }
+    }
+    bounds
 }
 
 fn evidence_of(parted: &SegmentedMesh, number: usize, radius: f64) -> Vec<SegmentPlace> {

@@ -35,7 +35,7 @@ pub(super) fn voids(
     of_face: &[u32],
     radius: f64,
 ) -> (Vec<Slot>, Vec<Slot>) {
-    let evidence = SegmentEvidence::of(parted, radius);
+    let evidence = SegmentEvidence::of(parted, of_face, radius);
     let ends = half_round(walls, &evidence);
     let known = axes(parted);
     let mut found: Vec<Slot> = Vec::new();

@@ -329,7 +329,9 @@ impl Void<'_> {
         let is_there = |x: f64, y: f64| {
             let p = self.middle + self.along * x + self.across * y;
             let up = parted.exit(land, &p, out);
-            let face = up.and_then(|up| around.closest(&(p + out * up), near));
+            let on = up.map(|up| p + out * up);
+            let on = on.filter(|on| self.view.evidence.is_near(land, on, near));
+            let face = on.and_then(|on| around.closest(&on, near));
             face.is_some_and(|face| self.view.of_face[face as usize] == land as u32)
         };
         let mut count = 0;
