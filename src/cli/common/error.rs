@@ -26,7 +26,7 @@ use touchup_session::refinement::RefinementError;
 use touchup_session::replay::ReplayError;
 use touchup_session::scan::ScanError;
 use touchup_session::scene::SceneError;
-use touchup_session::session::{OutcomeError, StepError};
+use touchup_session::session::{OutcomeError, StepFileError};
 use touchup_session::sweep::{SweepError, WhatIfError};
 use touchup_sim::SimError;
 
@@ -266,9 +266,9 @@ errors_of_rooms! {
         OutcomeError::Unchanged | OutcomeError::Contradictory(_) => ("input", 3),
         OutcomeError::Table(_) => NOT_WRITTEN,
     }, "";
-    StepError => |error| match error {
-        StepError::Write(_) => NOT_WRITTEN,
-        StepError::NoFace { .. } => ("input", 3),
+    StepFileError => |error| match error {
+        StepFileError::Write(_) => NOT_WRITTEN,
+        StepFileError::NoFace { .. } => ("input", 3),
     }, "";
     SimError => |error| match error {
         SimError::BadParameter { .. } | SimError::TooFine { .. } | SimError::TooCoarse { .. } => ("simulation", 2),

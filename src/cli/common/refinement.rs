@@ -19,7 +19,7 @@ use touchup_session::refinement::{
 };
 use touchup_session::replay::RecordedAs;
 use touchup_session::scene::{LeftOut, Memory, Scene, SceneCost};
-use touchup_session::session::{ResultFiles, StepSummary};
+use touchup_session::session::{ResultFiles, StepFileSummary};
 
 /// Input and output files of a refinement.
 #[derive(Clone, Debug)]
@@ -46,7 +46,7 @@ pub(in crate::cli) struct RefineSummary {
     refinement: RefinementSummary,
     /// Faces of the STEP file; absent without one.
     #[serde(skip_serializing_if = "Option::is_none")]
-    step: Option<StepSummary>,
+    step: Option<StepFileSummary>,
     load_s: f64,
     replay_s: f64,
 }

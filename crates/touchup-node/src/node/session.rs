@@ -19,7 +19,7 @@ use touchup_method::stylus::{Synchroniser, WrenchFrame};
 use touchup_session::live::{Engine, EngineResult, Gate, Latencies, Pace, Quantiles, TouchDelta};
 use touchup_session::session::{
     Outcome, OutcomeError, RecordingLoss, RefinedMesh, ResultFiles, SessionRecord, SessionRecorder,
-    StepOutcome, StrokeChanges,
+    StepFileOutcome, StrokeChanges,
 };
 
 /// Numbers of accepted, refused and skipped input.
@@ -363,7 +363,7 @@ pub fn write_result(
     setup: &Setup,
     result: EngineResult,
     files: &ResultFiles,
-) -> Result<(Outcome, Option<StepOutcome>), Box<OutcomeError>> {
+) -> Result<(Outcome, Option<StepFileOutcome>), Box<OutcomeError>> {
     let outside = setup.input.cut.outside.as_ref();
     let (mesh, outcome) = RefinedMesh::of(&setup.input.scan, result, outside, false)?;
     let step = files.write(mesh, &setup.scan_path, setup.mesh_unit)?;

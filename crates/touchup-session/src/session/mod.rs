@@ -18,5 +18,5 @@ pub use outcome::{
 pub use outliers::UncertaintySummary;
 pub use record::{RecordingLoss, SessionError, SessionFacts, SessionRecord, SessionRecorder};
 pub use remade::{EvidenceSource, RemakeError};
-pub use step_result::{StepError, StepOutcome, StepSummary, write_boundary};
+pub use step_result::{StepFileError, StepFileOutcome, StepFileSummary, write_boundary};
 pub use strokes::{Removal, StrokeChange, StrokeChanges, StrokeHistory, StrokeReplay, UndoStep};

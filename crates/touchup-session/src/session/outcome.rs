@@ -9,7 +9,7 @@ use serde::Serialize;
 use tracing::{debug, warn};
 
 use super::outliers::UncertaintySummary;
-use super::step_result::{StepOutcome, write_boundary};
+use super::step_result::{StepFileOutcome, write_boundary};
 use crate::live::EngineResult;
 use crate::reported;
 use crate::scan::carried_over;
@@ -371,7 +371,7 @@ impl ResultFiles {
         refined: RefinedMesh,
         scan: &Path,
         unit: MeshUnit,
-    ) -> Result<Option<StepOutcome>, OutcomeError> {
+    ) -> Result<Option<StepFileOutcome>, OutcomeError> {
         let RefinedMesh {
             mesh,
             origins,
@@ -412,7 +412,7 @@ impl ResultFiles {
         &self,
         touches: &[ProbedPoint],
         unit: MeshUnit,
-    ) -> Result<Option<StepOutcome>, OutcomeError> {
+    ) -> Result<Option<StepFileOutcome>, OutcomeError> {
         if let Some(out) = &self.touches {
             write_touches_as_named(out, touches)?;
         }

@@ -12,7 +12,7 @@ use touchup_io::step_file::{StepProduct, write_step};
 
 /// Error of writing a STEP file.
 #[derive(Debug, thiserror::Error)]
-pub enum StepError {
+pub enum StepFileError {
     /// The file.
     #[error(transparent)]
     Write(#[from] FileError),
@@ -27,11 +27,11 @@ pub enum StepError {
 }
 
 /// The faces of a written STEP file, or its fault.
-pub type StepOutcome = Result<StepSummary, StepError>;
+pub type StepFileOutcome = Result<StepFileSummary, StepFileError>;
 
 reported! {
     /// The faces of a STEP file in the report.
-    pub struct StepSummary, fn of(brep: &Brep, left_out: usize) {
+    pub struct StepFileSummary, fn of(brep: &Brep, left_out: usize) {
         /// trimmed faces
         faces: usize = brep.parts().faces.len(),
         /// trimmed faces fitted to touches
@@ -48,9 +48,9 @@ reported! {
 /// Writes the faces of a boundary as a STEP file with the name of the file as that of the product.
 ///
 /// # Errors
-/// [`StepError::NoFace`], [`StepError::Write`]; no file is left half written.
-pub fn write_boundary(path: &Path, boundary: &PartBoundary) -> StepOutcome {
-    let no_face = || StepError::NoFace {
+/// [`StepFileError::NoFace`], [`StepFileError::Write`]; no file is left half written.
+pub fn write_boundary(path: &Path, boundary: &PartBoundary) -> StepFileOutcome {
+    let no_face = || StepFileError::NoFace {
         path: path.to_owned(),
     };
     let brep = boundary.brep.as_ref().ok_or_else(no_face)?;
@@ -60,10 +60,10 @@ pub fn write_boundary(path: &Path, boundary: &PartBoundary) -> StepOutcome {
         time_stamp: None,
     };
     write_step(path, brep, &product)?;
-    Ok(StepSummary::of(brep, boundary.left_out))
+    Ok(StepFileSummary::of(brep, boundary.left_out))
 }
 
-impl fmt::Display for StepSummary {
+impl fmt::Display for StepFileSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self {
             faces,

@@ -19,7 +19,7 @@ use touchup_geometry::numeric::{DisjointSets, distinct, mean};
 const FAR_CORNER: f64 = 2.0;
 
 /// Junctions of chains; a short chain may join two of them.
-pub(super) struct Corners {
+pub(super) struct CornerPlaces {
     /// number of the corner at each end of chains, by vertex of the mesh
     pub of_vertex: BTreeMap<u32, usize>,
     /// place on all surfaces of the corner, m, and its largest distance from one; `None` without
@@ -35,7 +35,7 @@ struct CornerSearch<'a> {
     reach: f64,
 }
 
-impl Corners {
+impl CornerPlaces {
     /// - `curves`: of each chain.
     pub(super) fn of(
         mesh: &TriMesh,

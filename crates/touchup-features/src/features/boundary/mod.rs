@@ -22,7 +22,7 @@ mod trimming;
 
 use super::measure::Measure;
 use super::segmentation::facets::NONE;
-use corners::Corners;
+use corners::CornerPlaces;
 use curves::meeting;
 use faces::face_of;
 use graph::{BorderChain, LabelledRegion, RegionGraph};
@@ -114,7 +114,7 @@ fn trimmed(
         meeting(pair, &chain.points(mesh), scale)
     };
     let curves: Vec<_> = graph.chains.iter().map(curve).collect();
-    let corners = Corners::of(mesh, surfaces, graph, &curves, scale);
+    let corners = CornerPlaces::of(mesh, surfaces, graph, &curves, scale);
     let mut trimming = Trimming::of(mesh, surfaces, graph, &curves, &corners, scale);
     let (mut faces, mut faults) = (Vec::new(), Vec::new());
     for (region, loops) in graph.loops.iter().enumerate() {

@@ -1,6 +1,7 @@
 //! Sizes by which a mesh is read.
 
 use crate::features::measure::Measure;
+use crate::features::surfaces::BESIDE_CONTACTS;
 
 /// Width of the strip of a scan beside an edge that belongs to no surface, in median edges.
 const STRIP: f64 = 12.0;
@@ -14,9 +15,6 @@ const LEAST_AREA: f64 = 16.0;
 const SHORT: f64 = 0.5;
 /// Maximum distance of a chain of a drawing from its curve, in diagonals: its chords.
 const CHORDS: f64 = 0.005;
-/// Maximum distance of the scan from a touched surface that goes on over it, in radii of the ball:
-/// that of the faces beside contacts.
-const NEAR_TOUCHED: f64 = 0.25;
 
 /// Lengths that count beside the blur and noise of a mesh; 0 for a drawing, but for the reach.
 pub(super) struct BoundaryScale {
@@ -50,7 +48,7 @@ impl BoundaryScale {
         }
         let width = (STRIP * edge).min(STRIP_OF_ALL * diagonal);
         Self {
-            near_touched: NEAR_TOUCHED * measure.observed.reach(),
+            near_touched: BESIDE_CONTACTS * measure.observed.reach(),
             width,
             least_area: LEAST_AREA * edge * edge,
             short: SHORT * width,

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::Point3;
 
-use super::corners::Corners;
+use super::corners::CornerPlaces;
 use super::curves::{MeetingCurve, advance, tolerance_of, traced};
 use super::graph::{ChainUse, RegionGraph};
 use super::polyline::{is_beside, length_of, smoothed};
@@ -40,7 +40,7 @@ pub(super) struct Trimming<'a> {
     pub surfaces: &'a PartSurfaces,
     pub graph: &'a RegionGraph,
     pub curves: &'a [Option<MeetingCurve>],
-    pub corners: &'a Corners,
+    pub corners: &'a CornerPlaces,
     pub scale: &'a BoundaryScale,
     pub parts: BrepParts,
     /// of chains between two surfaces that meet
@@ -52,7 +52,7 @@ pub(super) struct Trimming<'a> {
 }
 
 /// One chain of a loop, in the direction of the loop.
-struct Step {
+struct LoopChain {
     chain_use: ChainUse,
     /// vertices at its ends, and its edges; `None`: a border of the region alone
     common: Option<CommonEdges>,
@@ -64,7 +64,7 @@ impl<'a> Trimming<'a> {
         surfaces: &'a PartSurfaces,
         graph: &'a RegionGraph,
         curves: &'a [Option<MeetingCurve>],
-        corners: &'a Corners,
+        corners: &'a CornerPlaces,
         scale: &'a BoundaryScale,
     ) -> Self {
         let mut parts = BrepParts::default();
@@ -190,7 +190,7 @@ impl<'a> Trimming<'a> {
         {
             return self.closed_border(region, *one);
         }
-        let steps: Vec<Step> = uses.iter().map(|one| self.step_of(*one)).collect();
+        let steps: Vec<LoopChain> = uses.iter().map(|one| self.step_of(*one)).collect();
         let mut edges = Vec::new();
         let count = steps.len();
         for at in 0..count {
@@ -218,7 +218,7 @@ impl<'a> Trimming<'a> {
         Some(edges)
     }
 
-    fn step_of(&self, chain_use: ChainUse) -> Step {
+    fn step_of(&self, chain_use: ChainUse) -> LoopChain {
         let common = self.common[chain_use.chain].clone().map(|mut common| {
             if !chain_use.is_forward {
                 common.ends.reverse();
@@ -230,7 +230,7 @@ impl<'a> Trimming<'a> {
             }
             common
         });
-        Step { chain_use, common }
+        LoopChain { chain_use, common }
     }
 
     /// Vertices at the ends of the border of one region: those of its neighbours in the loop, or of
@@ -238,7 +238,7 @@ impl<'a> Trimming<'a> {
     fn open_ends(
         &mut self,
         region: usize,
-        [before, after]: [&Step; 2],
+        [before, after]: [&LoopChain; 2],
         chain_use: ChainUse,
     ) -> Option<[usize; 2]> {
         let mut ends = self.graph.chains[chain_use.chain].ends()?;

@@ -15,7 +15,7 @@ use touchup_geometry::numeric::distinct;
 /// Maximum distance of a face from a contact on its surface, and of its corners from that, in radii
 /// of the ball.
 const REACH: f64 = 1.0;
-const OFF: f64 = 0.25;
+pub(in crate::features) const BESIDE_CONTACTS: f64 = 0.25;
 /// Tolerance of a touched surface, in radii of the ball.
 const TOLERANCE: f64 = 0.05;
 /// Mesh beside a touched bore has its radius and its axis within a share of the radius, at most
@@ -73,7 +73,14 @@ fn nearest(
                 let distance = (middle - place).norm();
                 let known = nearest.get(&face).map_or(REACH * radius, |known| known.0);
                 let is_nearer = distance < known;
-                if is_nearer && belongs(&parted.facets, face, &surface.primitive, OFF * radius) {
+                if is_nearer
+                    && belongs(
+                        &parted.facets,
+                        face,
+                        &surface.primitive,
+                        BESIDE_CONTACTS * radius,
+                    )
+                {
                     nearest.insert(face, (distance, number));
                 }
             }

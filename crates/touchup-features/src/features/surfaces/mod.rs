@@ -25,7 +25,7 @@ use settle::Settling;
 use touched_surface::TouchedSurface;
 use touchup_method::stylus::ProbedPoint;
 
-pub(in crate::features) use claim::claim;
+pub(in crate::features) use claim::{BESIDE_CONTACTS, claim};
 
 /// Minimum gain of a surface whose edges show the walls beside it.
 const LAND_GAIN: f64 = 20.0;
