@@ -222,8 +222,15 @@ def test_a_certificate_of_the_user_encrypts_the_page(touchup_bin, demo_folder, t
             page.take_until(lambda: page.faces)
         with pytest.raises(ssl.SSLError):
             ask(node.url, "/", context=ssl.create_default_context())
-        # a silent one delays no other
         place = urlsplit(node.url)
+        # no ticket for a client that reads and writes in two threads to lose its request to
+        with socket.create_connection((place.hostname, place.port)) as plain:
+            secure = trusted.wrap_socket(plain, server_hostname=place.hostname)
+            secure.sendall(b"GET / HTTP/1.0\r\n\r\n")
+            while secure.recv(1 << 12):
+                pass
+            assert secure.version() == "TLSv1.3" and not secure.session.has_ticket
+        # a silent one delays no other
         with socket.create_connection((place.hostname, place.port)):
             assert ask(node.url, "/", context=trusted)[0] == 200
 

@@ -58,7 +58,9 @@ impl Certificate {
         let config = ServerConfig::builder()
             .with_no_client_auth()
             .with_single_cert(chain, key);
-        let config = config.map_err(|error| bad(&self.key, error.to_string()))?;
+        let mut config = config.map_err(|error| bad(&self.key, error.to_string()))?;
+        // a client that reads and writes in two threads, as Python's, may lose its request to a ticket
+        config.send_tls13_tickets = 0;
         Ok(TlsAcceptor::from(Arc::new(config)))
     }
 }
