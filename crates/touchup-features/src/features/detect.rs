@@ -14,7 +14,7 @@ use super::rims::{OpeningOutline, RoundOpening, outlines, rims};
 use super::segmentation::scene::{SegmentedMesh, numbered_by_place};
 use super::shafts::is_shaft;
 use super::surfaces::{claim, touched_surfaces};
-use super::voids::{Slot, voids};
+use super::voids::{Slot, undercut_groups, voids};
 use super::walls::{ALL_AROUND, SAME_WALL, Wall};
 use touchup_geometry::mesh::{FaceTree, TriMesh};
 use touchup_geometry::numeric::distinct;
@@ -89,7 +89,7 @@ fn detected<T>(
         .partition(|feature| feature.kind == FeatureKind::Boss);
     features.extend(cut);
     let mut features = without_second_walls(features);
-    features.extend(slot_features(&measure, &slots, &pockets));
+    features.extend(slot_features(&measure, &slots, &pockets, holes.len()));
     let raised = bosses
         .iter()
         .map(|boss| boss_feature(&measure, &walls, boss))
@@ -227,7 +227,14 @@ fn hole_features(
 }
 
 /// Slots, then pockets.
-fn slot_features(measure: &Measure, slots: &[Slot], pockets: &[Slot]) -> Vec<Feature> {
+///
+/// - `grouped`: number of smaller numbers that groups may have.
+fn slot_features(
+    measure: &Measure,
+    slots: &[Slot],
+    pockets: &[Slot],
+    grouped: usize,
+) -> Vec<Feature> {
     let is_reported = |slot: &Slot, feature: &Feature| {
         // in a measured mesh a void open all around may be a gap between pieces
         let is_shut = slot.floor.is_some() || slot.is_closed;
@@ -235,9 +242,12 @@ fn slot_features(measure: &Measure, slots: &[Slot], pockets: &[Slot]) -> Vec<Fea
             || measure.observed.parted.rounding.is_some()
             || feature.fitted_to == FittedTo::Touches
     };
-    let measured = slots
-        .iter()
-        .map(|slot| (slot, slot_feature(measure, slot, FeatureKind::Slot)));
+    let groups = undercut_groups(slots);
+    let measured = slots.iter().zip(groups).map(|(slot, group)| {
+        let group = group.map(|at| (grouped + at) as u32);
+        let feature = slot_feature(measure, slot, FeatureKind::Slot);
+        (slot, Feature { group, ..feature })
+    });
     let measured = measured
         .filter(|(slot, feature)| is_reported(slot, feature))
         .map(|(_, feature)| feature);
@@ -699,6 +709,8 @@ fn slot_feature(measure: &Measure, slot: &Slot, kind: FeatureKind) -> Feature {
     let bottom = near - axis.value * slot.depth;
     let floor = AxisEnd::on(measure, slot.floor, &bottom, &axis.value);
     let centre = opening.centre(&fitted, Fit::middle_std);
+    // touched walls end where the touches do, often far before the slot
+    let has_length = fitted.to == FittedTo::Mesh || is_fixed(Freedom::Second);
     let length = if is_fixed(Freedom::Second) {
         length
     } else {
@@ -716,7 +728,7 @@ fn slot_feature(measure: &Measure, slot: &Slot, kind: FeatureKind) -> Feature {
         facets: measure.facets(&fitted.surface, &segments),
         direction: Some(direction),
         width: Some(fitted.number(width, &[(Freedom::Size, 1.0)])),
-        length: Some(fitted.number(length, &[(Freedom::Second, 1.0)])),
+        length: has_length.then(|| fitted.number(length, &[(Freedom::Second, 1.0)])),
         depth,
         axis: Some(axis),
         through: slot.through,

@@ -87,7 +87,7 @@ pub struct Feature {
     pub direction: Option<Vector3<f64>>,
     /// of a hole, notch, boss or cylinder, m
     pub diameter: Option<MeasuredValue<f64>>,
-    /// of a slot, pocket, edge or cylinder, m
+    /// of a slot, pocket, edge or cylinder, m; `None`: the ends of touched walls are untouched
     pub length: Option<MeasuredValue<f64>>,
     /// of a slot or pocket, m
     pub width: Option<MeasuredValue<f64>>,
@@ -99,7 +99,8 @@ pub struct Feature {
     pub through: Option<bool>,
     /// full angle of the countersink, rad
     pub cone_angle: Option<MeasuredValue<f64>>,
-    /// holes of one number belong together: steps on one axis
+    /// features of one number belong together: holes that are steps on one axis, a slot with its
+    /// undercuts
     pub group: Option<u32>,
     /// both ends of an edge or slot, m
     pub points: Vec<Point3<f64>>,

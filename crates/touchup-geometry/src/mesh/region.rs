@@ -16,6 +16,15 @@ pub struct Region {
 }
 
 impl Region {
+    /// The least box around points; `None` without any.
+    pub fn around(points: &[Point3<f64>]) -> Option<Self> {
+        let first = *points.first()?;
+        let [low, high] = points
+            .iter()
+            .fold([first; 2], |[low, high], p| [low.inf(p), high.sup(p)]);
+        Some(Self { low, high })
+    }
+
     /// The box widened by `margin` (m) on all sides.
     #[must_use]
     pub fn grown(&self, margin: f64) -> Self {

@@ -2,14 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Point3;
 
 use super::touched_surface::TouchedSurface;
 use crate::features::fit::{Cylinder, SurfaceModel};
 use crate::features::segmentation::primitive::{Primitive, belongs};
 use crate::features::segmentation::scene::SegmentedMesh;
 use crate::features::segmentation::segment::Segment;
-use touchup_geometry::mesh::{BoxQuery, FaceId};
+use touchup_geometry::mesh::{BoxQuery, FaceId, PointTree, Region};
 use touchup_geometry::numeric::distinct;
 
 /// Maximum distance of a face from a contact on its surface, and of its corners from that, in radii
@@ -62,27 +62,24 @@ fn nearest(
 ) -> BTreeMap<u32, (f64, usize)> {
     let mut nearest: BTreeMap<u32, (f64, usize)> = BTreeMap::new();
     let mut query = BoxQuery::default();
-    let box_of = Vector3::repeat(REACH * radius);
+    let (reach, beside) = (REACH * radius, BESIDE_CONTACTS * radius);
     for (number, surface) in surfaces.iter().enumerate() {
-        for place in surface.felt.iter().map(|felt| felt.place) {
-            parted
-                .tree
-                .faces_in_box(&(place - box_of), &(place + box_of), &mut query);
-            for &FaceId(face) in &query.faces {
-                let middle = parted.facets.mesh.barycentre(FaceId(face));
-                let distance = (middle - place).norm();
-                let known = nearest.get(&face).map_or(REACH * radius, |known| known.0);
-                let is_nearer = distance < known;
-                if is_nearer
-                    && belongs(
-                        &parted.facets,
-                        face,
-                        &surface.primitive,
-                        BESIDE_CONTACTS * radius,
-                    )
-                {
-                    nearest.insert(face, (distance, number));
-                }
+        let places: Vec<Point3<f64>> = surface.felt.iter().map(|felt| felt.place).collect();
+        let Some(around) = Region::around(&places) else {
+            continue;
+        };
+        let (around, contacts) = (around.grown(reach), PointTree::new(&places));
+        parted
+            .tree
+            .faces_in_box(&around.low, &around.high, &mut query);
+        for &FaceId(face) in &query.faces {
+            if !belongs(&parted.facets, face, &surface.primitive, beside) {
+                continue;
+            }
+            let middle = parted.facets.mesh.barycentre(FaceId(face));
+            let known = nearest.get(&face).map_or(reach, |known| known.0);
+            if let Some((_, distance)) = contacts.nearest(&middle, 1, known).next() {
+                nearest.insert(face, (distance, number));
             }
         }
     }

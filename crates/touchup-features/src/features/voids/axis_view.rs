@@ -3,8 +3,14 @@
 use nalgebra::{Point2, Point3, Vector2, Vector3};
 
 use super::evidence::SegmentEvidence;
+use crate::features::fit::SurfaceModel;
+use crate::features::segmentation::primitive::Primitive;
 use crate::features::walls::Wall;
 use touchup_geometry::numeric::tangent_basis;
+
+/// Maximum components of an end's axis, and of a flat end's normal, aslant to the axis: 12° and 9°.
+const END_AXIS: f64 = 0.978;
+const END_NORMAL: f64 = 0.15;
 
 /// Evidence seen along an axis.
 pub(super) struct AxisView<'a> {
@@ -14,6 +20,8 @@ pub(super) struct AxisView<'a> {
     pub axis: Vector3<f64>,
     /// of the plane square to it
     pub basis: [Vector3<f64>; 2],
+    /// numbers of the segments that may end a void
+    pub closers: Vec<usize>,
 }
 
 impl<'a> AxisView<'a> {
@@ -22,11 +30,18 @@ impl<'a> AxisView<'a> {
         evidence: &'a SegmentEvidence<'a>,
         of_face: &'a [u32],
     ) -> Self {
+        let segments = &evidence.parted.segmentation.segments;
+        let is_closer = |at: &usize| match &segments[*at].primitive {
+            Primitive::Cylinder(end) => end.concave && end.axis().dot(&axis).abs() > END_AXIS,
+            Primitive::Plane(end) => end.normal().dot(&axis).abs() <= END_NORMAL,
+            Primitive::Cone(_) => false,
+        };
         Self {
             evidence,
             of_face,
             axis,
             basis: tangent_basis(&axis),
+            closers: (0..segments.len()).filter(is_closer).collect(),
         }
     }
 

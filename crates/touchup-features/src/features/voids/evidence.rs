@@ -65,6 +65,8 @@ impl WallPiece {
 pub(super) struct SegmentEvidence<'a> {
     pub parted: &'a SegmentedMesh<'a>,
     pub of_segment: Vec<Vec<SegmentPlace>>,
+    /// box of the places of each segment
+    pub around: Vec<Region>,
     felt: Vec<SegmentPlace>,
     grid: PointGrid,
     /// gap between pieces of one surface, m, by segment
@@ -99,8 +101,10 @@ impl<'a> SegmentEvidence<'a> {
         (0..)
             .zip(&felt)
             .for_each(|(at, one)| grid.insert(at, &one.point));
+        let around = of_segment.iter().map(|places| around(places)).collect();
         Self {
             parted,
+            around,
             gap: gap.collect(),
             bounds: bounds(parted, of_face),
             of_segment,
@@ -236,6 +240,17 @@ fn widened([low, high]: [f64; 2], x: f64, half: f64) -> [f64; 2] {
 
 fn joined(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
     [a[0].min(b[0]), a[1].max(b[1])]
+}
+
+/// Box of places.
+fn around(places: &[SegmentPlace]) -> Region {
+    let [low, high] = NOTHING.map(|x| Point3::from(Vector3::repeat(x)));
+    places
+        .iter()
+        .fold(Region { low, high }, |around, one| Region {
+            low: around.low.inf(&(one.point - Vector3::repeat(one.half))),
+            high: around.high.sup(&(one.point + Vector3::repeat(one.half))),
+        })
 }
 
 /// Box of the faces of each segment.

@@ -18,7 +18,7 @@ use evidence::SegmentEvidence;
 use touchup_geometry::numeric::without_repeats;
 use void::LONG_BOX;
 
-pub(super) use slot::Slot;
+pub(super) use slot::{Slot, undercut_groups};
 
 /// Directions of axes are the same within 3°.
 const SAME_AXIS: f64 = 0.9986;

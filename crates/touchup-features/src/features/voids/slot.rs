@@ -62,3 +62,12 @@ impl Slot {
         is_between && overlap > self.depth.min(other.depth) / 2.0
     }
 }
+
+/// For each slot the number of the one that it belongs to: an undercut opens in a wall of its slot, as
+/// both sides of the room of a T-slot do. `None`: a slot by itself.
+pub(in crate::features) fn undercut_groups(slots: &[Slot]) -> Vec<Option<usize>> {
+    let host = |slot: &Slot| slots.iter().position(|one| one.walls.contains(&slot.land));
+    let hosts: Vec<Option<usize>> = slots.iter().map(host).collect();
+    let of_slot = |at: usize| hosts[at].or(hosts.contains(&Some(at)).then_some(at));
+    (0..slots.len()).map(of_slot).collect()
+}

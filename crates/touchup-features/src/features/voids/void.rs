@@ -1,12 +1,14 @@
 //! A void between two walls, with its ends, floor and opening.
 
+use std::ops::Range;
+
 use nalgebra::{Point3, Vector2, Vector3};
 
 use super::axis_view::AxisView;
 use super::evidence::SegmentPlace;
 use super::slot::Slot;
 
-use crate::features::fit::{Ends, SurfaceModel};
+use crate::features::fit::Ends;
 use crate::features::segmentation::facets::NONE;
 use crate::features::segmentation::primitive::Primitive;
 use crate::features::segmentation::scene::SegmentedMesh;
@@ -49,9 +51,6 @@ const ISLAND_NORMAL: f64 = 0.7;
 const FREE_ACROSS: f64 = 0.35;
 const FREE_ABOVE: f64 = 0.5;
 const NO_CEILING: [f64; 3] = [0.0, 0.4, -0.4];
-/// Maximum components of an end's axis, and of a flat end's normal, aslant to the axis: 12° and 9°.
-const END_AXIS: f64 = 0.978;
-const END_NORMAL: f64 = 0.15;
 /// Tolerance of the width of a round end, and of its place across, in widths.
 const END_WIDTH: f64 = 0.2;
 const END_ACROSS: f64 = 0.15;
@@ -60,8 +59,8 @@ const ASLANT: f64 = 0.26;
 const FLAT: f64 = 0.98;
 /// Ranges across a void, in widths, with places of a flat end, and of a half-round one: a rounded
 /// corner is on one side.
-const FLAT_END: std::ops::Range<f64> = -0.4..0.4;
-const ROUND_SIDES: [std::ops::Range<f64>; 2] = [-0.5..-0.1, 0.1..0.5];
+const FLAT_END: Range<f64> = -0.4..0.4;
+const ROUND_SIDES: [Range<f64>; 2] = [-0.5..-0.1, 0.1..0.5];
 /// Half of the range with places of a floor, in widths.
 const OF_FLOOR: f64 = 0.45;
 /// Number of places of an outline that evidence covers; their levels about half of the depth, in
@@ -167,30 +166,40 @@ impl Void<'_> {
     }
 
     /// Whether a part of the void holds some places of a segment.
-    fn has_places(
-        &self,
-        least: usize,
-        number: usize,
-        is_there: impl Fn(&Vector3<f64>, f64) -> bool,
-    ) -> bool {
+    ///
+    /// - `part`: ranges along, across and out of it, m.
+    fn has_places(&self, least: usize, number: usize, part: &[Range<f64>; 3]) -> bool {
+        let around = &self.view.evidence.around[number];
+        let middle = self.local(&nalgebra::center(&around.low, &around.high));
+        let half = (around.high - around.low) / 2.0;
+        let ways = [self.along, self.across, self.view.axis];
+        let is_apart = |at: usize| {
+            let reach = ways[at].abs().dot(&half);
+            middle[at] + reach < part[at].start || middle[at] - reach > part[at].end
+        };
+        if (0..3).any(is_apart) {
+            return false;
+        }
+        let is_there = |one: &&SegmentPlace| {
+            let q = self.local(&one.point);
+            let height = part[2].start - one.half..part[2].end + one.half;
+            part[0].contains(&q.x) && part[1].contains(&q.y) && height.contains(&q.z)
+        };
         let places = self.view.evidence.of_segment[number].iter();
-        let there = places.filter(|one| is_there(&self.local(&one.point), one.half));
-        there.take(least).count() == least
+        places.filter(is_there).take(least).count() == least
     }
 
     /// Whether contacts show material between the walls.
     fn has_island(&self) -> bool {
         let free = self.width / 2.0 - OF_ISLAND * self.view.evidence.radius;
-        let is_between = |q: &Vector3<f64>, _: f64| {
-            q.x.abs() < self.half && q.y.abs() < free && q.z.abs() < self.half_height
-        };
+        let between = [self.half, free, self.half_height].map(|half| -half..half);
         let is_island = |number: usize| {
             let primitive = &self.parted().segment(number).primitive;
             let normal = primitive.distance_and_normal(&self.middle).1;
             !self.walls.contains(&number)
                 && self.view.evidence.is_felt(number)
                 && normal.dot(&self.across).abs() > ISLAND_NORMAL
-                && self.has_places(LEAST_ISLAND, number, is_between)
+                && self.has_places(LEAST_ISLAND, number, &between)
         };
         (0..self.parted().segmentation.segments.len()).any(is_island)
     }
@@ -220,26 +229,29 @@ impl Void<'_> {
     pub(super) fn end(&self, sign: f64) -> VoidEnd {
         let inner = (self.half - 0.5 * self.width).max(0.0);
         let farthest = self.reach[usize::from(sign < 0.0)] + self.width;
+        let along = match sign > 0.0 {
+            true => inner..farthest,
+            false => -farthest..-inner,
+        };
         let open = VoidEnd {
             segment: None,
             distance: self.half,
             shape: EndShape::Open,
         };
         let mut best = (farthest, open);
-        for number in 0..self.parted().segmentation.segments.len() {
-            if self.walls.contains(&number) {
-                continue;
-            }
+        for &number in self
+            .view
+            .closers
+            .iter()
+            .filter(|at| !self.walls.contains(at))
+        {
             let Some((nearest, end)) = self.end_by(number, sign) else {
                 continue;
             };
-            let is_there = |q: &Vector3<f64>, half: f64, across: &std::ops::Range<f64>| {
-                across.contains(&(q.y / self.width))
-                    && q.z.abs() < self.half_height + half
-                    && (inner..farthest).contains(&(q.x * sign))
-            };
-            let is_in = |across: &std::ops::Range<f64>| {
-                self.has_places(LEAST_PLACES, number, |q, half| is_there(q, half, across))
+            let is_in = |across: &Range<f64>| {
+                let across = across.start * self.width..across.end * self.width;
+                let part = [along.clone(), across, -self.half_height..self.half_height];
+                self.has_places(LEAST_PLACES, number, &part)
             };
             let is_next = nearest > self.half - 0.5 * self.width && nearest < best.0;
             let is_across = || match end.shape {
@@ -259,10 +271,7 @@ impl Void<'_> {
             Primitive::Cylinder(cylinder) => {
                 let q = self.local(&cylinder.nearest_on_axis(&self.middle));
                 let off = (2.0 * cylinder.radius - self.width).abs();
-                let is_end = cylinder.concave
-                    && cylinder.axis().dot(&self.view.axis).abs() > END_AXIS
-                    && off < END_WIDTH * self.width
-                    && q.y.abs() < END_ACROSS * self.width;
+                let is_end = off < END_WIDTH * self.width && q.y.abs() < END_ACROSS * self.width;
                 let end = VoidEnd::round(number, q.x * sign + self.width / 2.0);
                 let nearest = q.x * sign + cylinder.radius;
                 is_end.then_some((nearest, end))
@@ -270,7 +279,7 @@ impl Void<'_> {
             Primitive::Plane(plane) => {
                 let along = self.along * sign;
                 let facing = -plane.normal().dot(&along);
-                if plane.normal().dot(&self.view.axis).abs() > END_NORMAL || facing < ASLANT {
+                if facing < ASLANT {
                     return None;
                 }
                 let distance = plane.along(&self.middle, &along)?;
@@ -350,15 +359,15 @@ impl Void<'_> {
     /// The floor: its number and distance below the middle, m.
     ///
     /// - `range`: along the void, m.
-    fn floor(&self, out: &Vector3<f64>, range: &std::ops::Range<f64>) -> Option<(usize, f64)> {
+    fn floor(&self, out: &Vector3<f64>, range: &Range<f64>) -> Option<(usize, f64)> {
         let lowest = self.half_height + BELOW * self.width;
-        let is_there =
-            |q: &Vector3<f64>, _: f64| q.y.abs() < OF_FLOOR * self.width && range.contains(&q.x);
+        let half = OF_FLOOR * self.width;
+        let part = [range.clone(), -half..half, f64::NEG_INFINITY..f64::INFINITY];
         let floor = |(number, _, normal): (usize, _, Vector3<f64>)| {
             let down = self.parted().exit(number, &self.middle, &-out)?;
             let is_floor = normal.dot(out) > LEVEL
                 && (0.0..lowest).contains(&down)
-                && self.has_places(LEAST_PLACES, number, is_there);
+                && self.has_places(LEAST_PLACES, number, &part);
             is_floor.then_some((number, down))
         };
         let floors = self.parted().planes().filter_map(floor);
@@ -372,7 +381,7 @@ impl Void<'_> {
         &self,
         middle: &Point3<f64>,
         out: &Vector3<f64>,
-        range: &std::ops::Range<f64>,
+        range: &Range<f64>,
         other: Option<&VoidOpening>,
     ) -> Bottom {
         if let Some((floor, distance)) = self.floor(out, range) {
@@ -411,7 +420,7 @@ impl Void<'_> {
         &self,
         sides: [Option<VoidOpening>; 2],
         middle: &Point3<f64>,
-        range: &std::ops::Range<f64>,
+        range: &Range<f64>,
     ) -> Option<(VoidOpening, Bottom)> {
         let is_above_floors = |side: &VoidOpening| {
             let floor = self.floor(&-side.out, range);
@@ -442,7 +451,13 @@ impl Void<'_> {
         let range = -ends[1].distance..ends[0].distance;
         let middle = self.middle + self.along * ((range.start + range.end) / 2.0);
         let (opening, bottom) = self.opened(sides, &middle, &range)?;
-        if !self.is_free(&opening) {
+        let is_ended = ends.iter().any(|end| end.segment.is_some());
+        let is_shown = !self.is_felt()
+            || is_ended
+            || bottom.floor.is_some()
+            || bottom.through == Some(true)
+            || self.has_land_beyond(&opening, &range);
+        if !is_shown || !self.is_free(&opening) {
             return None;
         }
         let out = opening.out;
@@ -482,6 +497,21 @@ impl Void<'_> {
         let covered = self.covered(&slot);
         slot.area = covered * opening.share * 2.0 * self.half * slot.depth;
         (covered >= LEAST_COVERED).then_some(slot)
+    }
+
+    /// Whether the land goes on beyond an end.
+    ///
+    /// - `range`: along the void, m.
+    fn has_land_beyond(&self, opening: &VoidOpening, range: &Range<f64>) -> bool {
+        let half = self.width / 2.0;
+        let ends = [
+            range.start - self.width..range.start,
+            range.end..range.end + self.width,
+        ];
+        ends.into_iter().any(|along| {
+            let part = [along, -half..half, f64::NEG_INFINITY..f64::INFINITY];
+            self.has_places(LEAST_PLACES, opening.land, &part)
+        })
     }
 
     /// Share of the outline of a slot with evidence of a wall.
