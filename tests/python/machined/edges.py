@@ -1,13 +1,13 @@
 """True straight edges of a part, and the errors of touched edges that features state.
 
-An edge of a part is broken by a small chamfer: the true edge is the line where the planes of both sides meet.
+The true edge is the line where the planes of both sides meet; a chamfer, from 0.8 mm on, is a side of two edges.
 """
 
 import numpy as np
 
 # flat faces that count as sides of an edge: least area, mm², and least spread across, mm: narrower ones are facets of round walls
 LEAST_MM2 = 4.0
-LEAST_SPREAD_MM = 0.5
+LEAST_SPREAD_MM = 0.3
 # a side is this close to its edge, mm, and parallel to it: 3°
 NEAR_MM = 1.0
 ALONG = 0.05
