@@ -1,7 +1,8 @@
 """Judges found features against the true ones of a part.
 
 A found feature matches a true one if its axis is within 20°, its middle no farther from the true axis than 0.25 sizes (or 0.8 mm), its
-place along the axis within the true extent (2 mm room), and its size within a factor of 1.6. Kinds do not matter for that: the judge counts
+place along the axis within the true extent (2 mm room), and its size within a factor of 1.6. The middle of a slot without a length may be
+anywhere along the true one: its ends were not touched. Kinds do not matter for that: the judge counts
 wrong kinds apart.  Errors are those of numbers with a stated standard deviation.
 """
 
@@ -45,6 +46,10 @@ def is_of(found, true):
     if cosine < np.cos(np.radians(20)):
         return False
     off = np.array(found["center_mm"]) - true.center_mm
+    direction = true.sizes.get("direction")
+    if direction is not None and found["kind"] == "slot" and "length_mm" not in found:
+        half = true.sizes["length_mm"] / 2
+        off -= np.clip(off @ direction, -half, half) * direction
     along = off @ true.axis
     aside = np.linalg.norm(off - along * true.axis)
     size, other = size_of(true.kind, true.sizes), size_of(found["kind"], found)

@@ -5,5 +5,6 @@ mod detection;
 mod files;
 mod fit;
 mod form;
+mod slots;
 mod touched;
 mod track;

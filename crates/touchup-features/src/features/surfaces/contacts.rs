@@ -130,10 +130,15 @@ fn beside(all: &[ContactCell], radius: f64) -> Vec<Vec<u32>> {
         .for_each(|(at, contact)| grid.insert(at, &contact.point));
     let neighbours = |at: usize| {
         let place = &all[at].point;
-        let distance = |other: &u32| (all[*other as usize].point - place).norm_squared();
+        // bits of numbers from 0 on are in their order
+        let distance = |other: &u32| {
+            (all[*other as usize].point - place)
+                .norm_squared()
+                .to_bits()
+        };
         let near = grid.near(place, reach).filter(|&other| other != at);
         let mut near: Vec<u32> = near.map(|other| other as u32).collect();
-        near.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
+        near.sort_by_cached_key(distance);
         let far = near.split_off(near.len().min(NEAREST));
         near.extend(far.iter().step_by(far.len().div_ceil(NEAREST).max(1)));
         near.sort_unstable();
