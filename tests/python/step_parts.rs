@@ -286,6 +286,52 @@ fn crossed() -> Made<BrepParts> {
     Ok(parts)
 }
 
+/// 80 by 40 by 20 with a dome of radius 13 about (20, 20, 15), a seat of radius 13 about (60, 20, 25),
+/// and between them a hole Ø 4, 10 deep to the pole of its ball-nosed end.
+fn spheres() -> Made<BrepParts> {
+    let mut parts = BrepParts::default();
+    let (bottom, top) = prism(&mut parts, [80.0, 40.0, 20.0]);
+    let (floor, lid) = (plane(0.0, DOWN), plane(20.0, UP));
+    // the pole is on the face
+    let ball = |x: f64, z: f64, radius: f64, pole| {
+        let radius = radius * 1e-3;
+        AnalyticSurface::along(at(x, 20.0, z), pole, SurfaceShape::Sphere { radius })
+    };
+    let (dome, seat) = (ball(20.0, 15.0, 13.0, UP), ball(60.0, 25.0, 13.0, DOWN));
+    let (bore, nose) = (cylinder(40.0, 20.0, 2.0), ball(40.0, 12.0, 2.0, DOWN));
+    let foot = rim(&mut parts, &dome, &lid)?;
+    let edge = rim(&mut parts, &seat, &lid)?;
+    let mouth = rim(&mut parts, &bore, &lid)?;
+    // both touch there
+    let equator = rim(&mut parts, &nose, &plane(12.0, UP))?;
+    add(&mut parts, "bottom", floor, true, vec![bottom]);
+    let holes = [foot, edge, mouth].map(|rim| one(rim.reversed()));
+    let loops = [vec![top], holes.into()].concat();
+    add(&mut parts, "top", lid, true, loops);
+    add(&mut parts, "dome", dome, true, vec![one(foot)]);
+    add(&mut parts, "seat", seat, false, vec![one(edge)]);
+    let loops = [equator.reversed(), mouth].map(one).into();
+    add(&mut parts, "bore", bore, false, loops);
+    add(&mut parts, "nose", nose, false, vec![one(equator)]);
+    Ok(parts)
+}
+
+/// A whole ball Ø 10.
+fn ball() -> Made<BrepParts> {
+    let mut parts = BrepParts::default();
+    let shape = SurfaceShape::Sphere { radius: 5e-3 };
+    let surface = AnalyticSurface::along(at(1.0, 2.0, 3.0), UP, shape);
+    let pole = parts.vertex(at(1.0, 2.0, 8.0));
+    add(
+        &mut parts,
+        "ball",
+        surface,
+        true,
+        vec![FaceLoop::Vertex(pole)],
+    );
+    Ok(parts)
+}
+
 fn main() -> Made<()> {
     let folder = PathBuf::from(std::env::args_os().nth(1).ok_or("name a folder")?);
     std::fs::create_dir_all(&folder)?;
@@ -297,6 +343,8 @@ fn main() -> Made<()> {
         ("slot", slot),
         ("oblique", oblique),
         ("crossed", crossed),
+        ("spheres", spheres),
+        ("ball", ball),
     ];
     for (name, part) in all {
         // 1 nm; general curves are right to 10 nm at 10 mm

@@ -25,7 +25,7 @@ from OCP.XCAFDoc import XCAFDoc_DocumentTool
 from OCP.collections import Sequence_TDF_Label
 from scipy.integrate import quad
 
-PLANE, CYLINDER, CONE = (getattr(GeomAbs_SurfaceType, f"GeomAbs_{name}") for name in ("Plane", "Cylinder", "Cone"))
+PLANE, CYLINDER, CONE, SPHERE = (getattr(GeomAbs_SurfaceType, f"GeomAbs_{name}") for name in ("Plane", "Cylinder", "Cone", "Sphere"))
 ELLIPSE, SPLINE = GeomAbs_CurveType.GeomAbs_Ellipse, GeomAbs_CurveType.GeomAbs_BSplineCurve
 # of numbers that pass through unit vectors and radii in mm
 ROUNDING = 1e-12
@@ -100,12 +100,19 @@ def of_plate():
     return 60 * 40 * 20 - math.pi * 16 * 20 - math.pi * 25 * 12 - tip
 
 
+def of_spheres():
+    # caps of 8 at a radius of 13, out and in, cancel
+    return 80 * 40 * 20 - math.pi * 4 * 8 - 2 * math.pi * 8 / 3
+
+
 CLOSED = {
     "box": (10 * 20 * 30, {PLANE: 6}),
     "plate": (of_plate(), {PLANE: 6, CYLINDER: 2, CONE: 1}),
     "counterbore": (math.pi * (225 * 20 - 9 * 15 - 36 * 5), {PLANE: 3, CYLINDER: 3}),
     "slot": ((40 * 30 - 12 * 8 - math.pi * 16) * 10, {PLANE: 8, CYLINDER: 2}),
     "oblique": (math.pi * 25 * 20, {PLANE: 2, CYLINDER: 1}),
+    "spheres": (of_spheres(), {PLANE: 6, CYLINDER: 1, SPHERE: 3}),
+    "ball": (math.pi * 500 / 3, {SPHERE: 1}),
     "crossed": (math.pi * 3000 - crossing_volume(10, 4), {PLANE: 2, CYLINDER: 2}),
 }
 
@@ -142,6 +149,9 @@ def test_sizes_are_those_of_the_parts_in_mm(part):
     assert bottom.Distance(top) == pytest.approx(20, abs=ROUNDING)
     axes = [plate[name].Cylinder().Axis().Location() for name in ("through hole", "blind hole")]
     assert axes[0].Distance(axes[1]) == pytest.approx(27, abs=ROUNDING)
+    spheres = part("spheres").faces
+    assert [spheres[name].Sphere().Radius() for name in ("dome", "seat", "nose")] == pytest.approx([13, 13, 2], abs=ROUNDING)
+    assert spheres["seat"].Sphere().Location().Z() == pytest.approx(25, abs=ROUNDING)
 
 
 

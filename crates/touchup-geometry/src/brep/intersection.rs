@@ -2,6 +2,7 @@
 
 use nalgebra::{Point3, Vector2, Vector3};
 
+use super::circles::{circles, line_and_circle};
 use super::curve::SpaceCurve;
 use super::meridian::coaxial;
 use super::placement::{AxisPlacement, COINCIDENT, PARALLEL};
@@ -12,9 +13,10 @@ use super::surface::{AnalyticSurface, SurfaceShape};
 /// tangency. `None` of a pair without a form here.
 ///
 /// Lines, circles and ellipses are exact: of two planes; of a plane and a cylinder; of two surfaces
-/// of revolution about one axis; of parallel cylinders; of equal cylinders with crossing axes. A
-/// cylinder meets a skew cylinder, and a cone that its lines cross, in splines no farther from both
-/// than 10⁻⁶ of the radius. Missing are a cone cut aslant, and two skew cones.
+/// of revolution about one axis, such as a sphere and any plane; of parallel cylinders; of equal
+/// cylinders with crossing axes. A cylinder meets a skew cylinder, a sphere aside, and a cone that
+/// its lines cross, in splines no farther from both than 10⁻⁶ of the radius. Missing are a cone cut
+/// aslant or with a sphere aside, and two skew cones.
 pub fn intersection(a: &AnalyticSurface, b: &AnalyticSurface) -> Option<Vec<SpaceCurve>> {
     use SurfaceShape::{Cylinder, Plane};
     if let Some(circles) = coaxial(a, b) {
@@ -132,41 +134,6 @@ fn equal_cylinders(
         }
     };
     Some(vec![ellipse(b.axis), ellipse(-b.axis)])
-}
-
-/// Common points of a line, its direction of length 1, and a circle: one at a tangency.
-fn line_and_circle(
-    point: &Vector2<f64>,
-    direction: &Vector2<f64>,
-    centre: &Vector2<f64>,
-    radius: f64,
-) -> Vec<Vector2<f64>> {
-    let foot = point + direction * (centre - point).dot(direction);
-    let off = (foot - centre).norm();
-    if (off - radius).abs() <= COINCIDENT * radius {
-        return vec![foot];
-    }
-    let half = ((radius - off) * (radius + off)).max(0.0).sqrt();
-    let ends = [foot - direction * half, foot + direction * half];
-    if half > 0.0 { ends.into() } else { Vec::new() }
-}
-
-/// Common points of two circles: one at a tangency, none of concentric ones.
-fn circles(
-    centre: &Vector2<f64>,
-    radius: f64,
-    other: &Vector2<f64>,
-    other_radius: f64,
-) -> Vec<Vector2<f64>> {
-    let apart = (other - centre).norm();
-    if apart <= COINCIDENT * radius.max(other_radius) {
-        return Vec::new();
-    }
-    // on the line of equal power, square to the line of centres
-    let along = (apart + (radius - other_radius) * (radius + other_radius) / apart) / 2.0;
-    let unit = (other - centre) / apart;
-    let square = Vector2::new(-unit.y, unit.x);
-    line_and_circle(&(centre + unit * along), &square, centre, radius)
 }
 
 #[cfg(test)]
@@ -391,5 +358,38 @@ mod tests {
         assert_eq!(checked(&behind, &cone).len(), 0);
         let aslant = surface([0.0; 3], [1.0, 0.0, 1.0], SurfaceShape::Plane);
         assert_eq!(intersection(&cone, &aslant), None);
+    }
+
+    /// Squared radii of right triangles, the height 12 of the triangle 13, 14, 15, and a cone of slope
+    /// 3/4 from the middle of its sphere.
+    #[test]
+    fn a_sphere_meets_what_is_about_a_diameter_in_circles() {
+        let sphere =
+            |origin, radius| surface(origin, [0.0, 0.0, 1.0], SurfaceShape::Sphere { radius });
+        let ball = sphere([0.0; 3], 0.013);
+        let cut = surface([0.0, 0.005, 0.0], [0.0, -1.0, 0.0], SurfaceShape::Plane);
+        assert_close(&radii(&checked(&ball, &cut)), &[0.012]);
+        let aside = surface([0.0, 0.014, 0.0], [0.0, 1.0, 0.0], SurfaceShape::Plane);
+        assert_eq!(checked(&ball, &aside).len(), 0);
+        let stem = SurfaceShape::Cylinder { radius: 0.005 };
+        let stem = surface([0.03, 0.0, 0.0], [1.0, 0.0, 0.0], stem);
+        assert_close(&radii(&checked(&ball, &stem)), &[0.005, 0.005]);
+        let other = sphere([0.014, 0.0, 0.0], 0.015);
+        assert_close(&radii(&checked(&ball, &other)), &[0.012]);
+        assert_eq!(
+            intersection(&ball, &sphere([0.0; 3], 0.01)),
+            Some(Vec::new())
+        );
+        let (radius, half_angle) = (0.0, 0.75f64.atan());
+        let cone = surface(
+            [0.0; 3],
+            [0.0, 1.0, 0.0],
+            SurfaceShape::Cone { radius, half_angle },
+        );
+        assert_close(&radii(&checked(&cone, &sphere([0.0; 3], 0.01))), &[0.006]);
+        // a hole aside enters and leaves
+        let hole = SurfaceShape::Cylinder { radius: 0.003 };
+        let hole = surface([0.004, 0.0, 0.0], [0.1, 0.2, 1.0], hole);
+        assert_eq!(checked(&hole, &ball).len(), 2);
     }
 }

@@ -6,6 +6,7 @@
 //! bound a cylinder.
 
 mod check;
+mod circles;
 mod curve;
 mod error;
 mod intersection;

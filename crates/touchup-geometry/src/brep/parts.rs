@@ -51,7 +51,7 @@ pub enum FaceLoop {
     /// each edge begins at the end of the one before it; the face is on the left, seen from outside
     /// of the part
     Edges(Vec<OrientedEdge>),
-    /// the apex of a cone
+    /// the apex of a cone, or the pole of a whole sphere
     Vertex(usize),
 }
 

@@ -1,9 +1,9 @@
-//! The straight lines of a cylinder against a cylinder or a cone: along each, the other
+//! The straight lines of a cylinder against a cylinder, a cone or a sphere: along each, the other
 //! surface is the root of a quadratic, and the roots over the turn are the common curves.
 
 use std::f64::consts::TAU;
 
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 
 use super::curve::SpaceCurve;
 use super::placement::COINCIDENT;
@@ -50,7 +50,7 @@ struct Ruling<'a> {
     growth: f64,
 }
 
-/// Closed curves of a cylinder and a cylinder or cone.
+/// Closed curves of a cylinder and a cylinder, cone or sphere.
 ///
 /// `None` of other surfaces, of lines that meet a cone less steeply than its wall does, and of
 /// curves with a corner.
@@ -61,6 +61,7 @@ pub(super) fn ruled(a: &AnalyticSurface, b: &AnalyticSurface) -> Option<Vec<Spac
     let (other_radius, growth) = match b.shape {
         SurfaceShape::Cylinder { radius } => (radius, 0.0),
         SurfaceShape::Cone { radius, half_angle } => (radius, half_angle.tan()),
+        SurfaceShape::Sphere { radius } => (radius, 0.0),
         SurfaceShape::Plane => return None,
     };
     let ruling = Ruling {
@@ -84,10 +85,15 @@ impl Ruling<'_> {
     }
 
     fn quadratic(&self, turn: f64) -> Quadratic {
-        let (line, axis) = (self.cylinder.placement.axis, self.other.placement.axis);
+        let line = self.cylinder.placement.axis;
         let off = self.on_circle(turn) - self.other.placement.origin;
-        let (rise, height) = (line.dot(&axis), off.dot(&axis));
-        let (across, away) = (line - axis * rise, off - axis * height);
+        // a sphere has the same distance in each direction
+        let along = match self.other.shape {
+            SurfaceShape::Sphere { .. } => Vector3::zeros(),
+            _ => self.other.placement.axis,
+        };
+        let (rise, height) = (line.dot(&along), off.dot(&along));
+        let (across, away) = (line - along * rise, off - along * height);
         let (wider, wide) = (self.growth * rise, self.other_radius + self.growth * height);
         Quadratic {
             a: across.norm_squared() - wider * wider,

@@ -24,9 +24,15 @@ pub enum SurfaceShape {
         /// between axis and wall, rad, above 0 and below π/2
         half_angle: f64,
     },
+    /// about the origin, with its poles on the axis
+    Sphere {
+        /// positive
+        radius: f64,
+    },
 }
 
-/// Surface in O. Its outward side is that of the axis of a plane, and away from the axis of another.
+/// Surface in O. Its outward side is that of the axis of a plane, and away from the axis of another,
+/// or from the centre of a sphere.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AnalyticSurface {
     /// its place
@@ -54,10 +60,11 @@ impl AnalyticSurface {
             SurfaceShape::Cone { radius, half_angle } => {
                 (across - radius) * half_angle.cos() - at.z * half_angle.sin()
             }
+            SurfaceShape::Sphere { radius } => at.norm() - radius,
         }
     }
 
-    /// Outward unit normal at the foot of a point; zero on an axis.
+    /// Outward unit normal at the foot of a point; zero on an axis, or in the centre of a sphere.
     pub fn normal(&self, p: &Point3<f64>) -> Vector3<f64> {
         let axis = self.placement.axis;
         let off = p - self.placement.origin;
@@ -69,6 +76,7 @@ impl AnalyticSurface {
                 radial * half_angle.cos() - axis * half_angle.sin()
             }
             SurfaceShape::Cone { .. } => Vector3::zeros(),
+            SurfaceShape::Sphere { .. } => length_and_direction(&off).1,
         }
     }
 
@@ -76,7 +84,9 @@ impl AnalyticSurface {
     pub(super) fn size(&self) -> f64 {
         match self.shape {
             SurfaceShape::Plane => 0.0,
-            SurfaceShape::Cylinder { radius } | SurfaceShape::Cone { radius, .. } => radius,
+            SurfaceShape::Cylinder { radius }
+            | SurfaceShape::Cone { radius, .. }
+            | SurfaceShape::Sphere { radius } => radius,
         }
     }
 
@@ -85,7 +95,9 @@ impl AnalyticSurface {
         let is_length = |x: f64| x > 0.0 && x.is_finite();
         let is_shape = match self.shape {
             SurfaceShape::Plane => true,
-            SurfaceShape::Cylinder { radius } => is_length(radius),
+            SurfaceShape::Cylinder { radius } | SurfaceShape::Sphere { radius } => {
+                is_length(radius)
+            }
             SurfaceShape::Cone { radius, half_angle } => {
                 (radius == 0.0 || is_length(radius)) && half_angle > 0.0 && half_angle < FRAC_PI_2
             }
@@ -98,7 +110,7 @@ impl AnalyticSurface {
 mod tests {
     use super::*;
 
-    fn each() -> [AnalyticSurface; 3] {
+    fn each() -> [AnalyticSurface; 4] {
         let shapes = [
             SurfaceShape::Plane,
             SurfaceShape::Cylinder { radius: 0.01 },
@@ -106,6 +118,7 @@ mod tests {
                 radius: 0.01,
                 half_angle: 0.5,
             },
+            SurfaceShape::Sphere { radius: 0.01 },
         ];
         let (origin, axis) = (Point3::new(0.1, -0.2, 0.05), Vector3::new(1.0, 2.0, -3.0));
         shapes.map(|shape| AnalyticSurface::along(origin, axis, shape))
@@ -134,6 +147,7 @@ mod tests {
         let bad = [
             SurfaceShape::Cylinder { radius: 0.0 },
             SurfaceShape::Cylinder { radius: f64::NAN },
+            SurfaceShape::Sphere { radius: -0.01 },
             SurfaceShape::Cone {
                 radius: 0.01,
                 half_angle: FRAC_PI_2,

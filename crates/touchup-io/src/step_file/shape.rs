@@ -85,6 +85,9 @@ fn add_surface(out: &mut Instances, surface: &AnalyticSurface) -> InstanceId {
             let (radius, half_angle) = (millimetres(radius), real(half_angle));
             format!("CONICAL_SURFACE('',{at},{radius},{half_angle})")
         }
+        SurfaceShape::Sphere { radius } => {
+            format!("SPHERICAL_SURFACE('',{at},{})", millimetres(radius))
+        }
     };
     out.add(&entity)
 }
