@@ -5,7 +5,8 @@ use std::fmt;
 use serde::Serialize;
 
 use crate::cli::{Losses, reported};
-use touchup_features::calibrate::{CheckedPlace, ReferenceSphere, SphereFit, WorkspaceCheck};
+use touchup_features::calibrate::{CheckedPlace, ReferenceSphere, WorkspaceCheck};
+use touchup_features::features::fit::SphereFit;
 use touchup_probing::execute::{
     NotReached, Repeatability, SphereOrientation, SphereTouches, SpotTouch,
 };

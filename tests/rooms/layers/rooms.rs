@@ -26,7 +26,7 @@ pub const MAY_USE: &[(&str, &str)] = &[
     ("conformity", "numeric features"),
     ("align", "numeric mesh features"),
     ("compare", "numeric stylus mesh align features"),
-    ("calibrate", "numeric stylus mesh align"),
+    ("calibrate", "numeric stylus mesh align features"),
     ("diagnose", "numeric stylus mesh"),
     (
         "io",

@@ -23,7 +23,7 @@ mod workspace;
 
 pub use dwell::{Dwell, DwellFinder, DwellParams};
 pub use payload::{PayloadError, PayloadFit, PayloadParams, VectorEstimate, fit_payload};
-pub use sphere::{ReferenceSphere, SphereFit, beside_spheres, fit_sphere};
+pub use sphere::{ReferenceSphere, beside_spheres};
 pub use static_segments::{SampleBlock, StaticPose, StaticSegmentFinder, StaticSegmentParams};
 pub use tip::{SwingPose, TipError, TipFit, TipFitParams, fit_tip};
 pub use tip_by_plane::{PlaneTipError, PlaneTipFit, fit_tip_by_plane};

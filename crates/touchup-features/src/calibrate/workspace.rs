@@ -15,8 +15,9 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::sphere::{ReferenceSphere, SphereFit, fit_sphere};
+use super::sphere::ReferenceSphere;
 use crate::align::{PointPair, closest_motion};
+use crate::features::fit::{SphereFit, fit_sphere};
 use touchup_geometry::numeric::{mean, spreads};
 
 /// Touches of one sphere with one orientation of the probe.

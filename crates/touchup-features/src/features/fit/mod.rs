@@ -1,4 +1,4 @@
-//! Least squares fits of planes, cylinders, cones and slots to touches or a mesh, with a reliable
+//! Least squares fits of planes, cylinders, cones, spheres and slots to touches or a mesh, with a reliable
 //! uncertainty.
 //!
 //! A surface has a pose and up to two sizes; [`SurfaceModel`] names its share of these eight
@@ -25,6 +25,7 @@ mod observation;
 mod plane;
 mod robust;
 mod solver;
+mod sphere;
 mod stadium;
 mod surface;
 mod uncertainty;
@@ -39,5 +40,6 @@ pub use observation::{FitParams, Observation};
 pub use plane::Plane;
 pub use robust::fit;
 pub(crate) use robust::fit_mesh;
+pub use sphere::{Sphere, SphereFit, fit_sphere};
 pub use stadium::{Ends, Stadium, from_segment};
 pub use surface::{Distance, FREEDOMS, Freedom, Steps, SurfaceModel};
