@@ -42,8 +42,8 @@ pub(super) struct FeaturesArguments {
     /// Output: the features as JSON, or as a table, .csv or .parquet
     #[arg(long, value_name = "FEATURES")]
     out: Option<PathBuf>,
-    /// Output: the faces as a STEP file (AP242) for CAD programs: planes, cylinders and cones,
-    /// trimmed where they meet
+    /// Output: the faces as a STEP file (AP242) for CAD programs: planes, cylinders, cones and
+    /// spheres, trimmed where they meet
     #[arg(long, value_name = "STEP")]
     step: Option<PathBuf>,
     /// Prints the features as JSON
@@ -54,7 +54,7 @@ pub(super) struct FeaturesArguments {
 /// Kind of search on a mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum FeaturesMode {
-    /// Holes, slots, pockets, bosses, edges, corners and planes, fitted by least squares
+    /// Holes, slots, pockets, bosses, spheres, edges, corners and planes, fitted by least squares
     Fitted,
     /// Control points of the paper: clusters of high Gaussian curvature
     Paper,

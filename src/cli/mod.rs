@@ -111,7 +111,7 @@ enum Verb {
     Init(init::InitArguments),
     /// Refines a scan by a recording of touches
     Refine(refine::RefineArguments),
-    /// Detects and measures holes, slots, pockets, bosses, edges, corners and planes on a mesh
+    /// Detects and measures holes, slots, pockets, bosses, spheres, edges, corners and planes on a mesh
     Features(features::FeaturesArguments),
     /// Inspects measured features against a drawing: pass, fail or undecided, with a printable
     /// report

@@ -7,11 +7,13 @@ import type { TextKey } from "./texts";
 
 const KIND_TEXTS: TextKey[] = [
   "kindUnknown", "kindHole", "kindSlot", "kindPocket", "kindBoss", "kindEdge", "kindCorner", "kindPlane", "kindCylinder", "kindNotch",
+  "kindSphere",
 ];
 
 /** Kinds for a flag, the likeliest first. */
 export const FLAGGABLE = [
-  Kind.hole, Kind.slot, Kind.pocket, Kind.boss, Kind.edge, Kind.corner, Kind.plane, Kind.cylinder, Kind.notch, Kind.unknown,
+  Kind.hole, Kind.slot, Kind.pocket, Kind.boss, Kind.edge, Kind.corner, Kind.plane, Kind.cylinder, Kind.notch, Kind.sphere,
+  Kind.unknown,
 ];
 
 export function kindText(kind: number): TextKey {

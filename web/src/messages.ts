@@ -26,7 +26,7 @@ export interface State {
 }
 
 export const Kind = {
-  unknown: 0, hole: 1, slot: 2, pocket: 3, boss: 4, edge: 5, corner: 6, plane: 7, cylinder: 8, notch: 9,
+  unknown: 0, hole: 1, slot: 2, pocket: 3, boss: 4, edge: 5, corner: 6, plane: 7, cylinder: 8, notch: 9, sphere: 10,
 } as const;
 export const Status = { flagged: 1, found: 2, probed: 3 } as const;
 export const FittedTo = { nothing: 0, mesh: 1, touches: 2 } as const;

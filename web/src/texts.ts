@@ -199,6 +199,7 @@ export const texts = {
   kindPlane: ["Plane", "Ebene", "Plano"],
   kindCylinder: ["Cylinder", "Zylinder", "Cilindro"],
   kindNotch: ["Notch", "Kerbe", "Muesca"],
+  kindSphere: ["Sphere", "Kugelfläche", "Esfera"],
   notMeasured: ["not measured yet", "noch nicht gemessen", "sin medir"],
   toMeasure: ["to be measured", "zu messen", "por medir"],
   fromScan: ["from the scan, not touched", "aus dem Scan, nicht angetastet", "del escaneo, sin tocar"],

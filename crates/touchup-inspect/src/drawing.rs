@@ -104,7 +104,8 @@ impl PartDrawing {
                 .map_or_else(|_| left.push(name), |one| characteristics.push(one));
         }
         if characteristics.is_empty() {
-            let why = "no hole, slot, pocket, boss, notch or cylinder was found on it".to_owned();
+            let why =
+                "no hole, slot, pocket, boss, notch, cylinder or sphere was found on it".to_owned();
             return Err(InspectionError::Drawing {
                 path: path.to_owned(),
                 why,
@@ -301,7 +302,9 @@ fn features_of_mesh(path: &Path, params: &DrawingParams) -> Result<FeatureFile, 
 }
 
 /// Kinds with sizes.
-const WITH_SIZES: [&str; 6] = ["hole", "slot", "pocket", "boss", "notch", "cylinder"];
+const WITH_SIZES: [&str; 7] = [
+    "hole", "slot", "pocket", "boss", "notch", "cylinder", "sphere",
+];
 
 /// Feature sizes as nominal values without tolerances, each with its loss by facets, mm; through
 /// holes without depth.

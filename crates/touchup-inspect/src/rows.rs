@@ -397,7 +397,9 @@ impl<'a> MatchedCharacteristic<'a> {
 }
 
 /// Kinds that usually have a characteristic in a drawing.
-const COUNTED: [&str; 6] = ["hole", "slot", "pocket", "boss", "cylinder", "notch"];
+const COUNTED: [&str; 7] = [
+    "hole", "slot", "pocket", "boss", "cylinder", "notch", "sphere",
+];
 
 fn record_of(
     source: &InspectionSource,

@@ -216,10 +216,10 @@ reported! {
         /// edge, slot, pocket: both ends
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
         pub points_mm: Vec<[f64; 3]> = feature.points.iter().map(point_mm).collect(),
-        /// edge: whether the material is inside of it
+        /// edge, sphere: whether the material is inside of it
         pub convex?: bool = feature.is_convex,
         /// standard uncertainties by name of the number: `center_mm` (across the axis, of a plane
-        /// along its normal, of a corner in space), `axis_deg`, `diameter_mm`, `length_mm`,
+        /// along its normal, of a corner or sphere in space), `axis_deg`, `diameter_mm`, `length_mm`,
         /// `width_mm`, `depth_mm`, `cone_angle_deg`
         #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
         pub std: BTreeMap<String, f64> =

@@ -39,7 +39,7 @@ pub struct InspectionRecord {
     pub alignment: Option<AlignmentRecord>,
     /// in the order of the drawing
     pub characteristics: Vec<CharacteristicRecord>,
-    /// measured holes, slots, pockets, bosses, cylinders and notches without a characteristic, by
+    /// measured holes, slots, pockets, bosses, cylinders, notches and spheres without a characteristic, by
     /// `id`
     pub without_characteristic: Vec<u32>,
     /// further remarks, a sentence each

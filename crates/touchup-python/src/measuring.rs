@@ -31,7 +31,7 @@ const POINTS: f64 = 100_000.0;
 /// Number of mesh points for each of many alignments.
 const POINTS_EACH: f64 = 20_000.0;
 
-/// Holes, slots, pockets, bosses, edges, corners and planes of a mesh, as JSON.
+/// Holes, slots, pockets, bosses, spheres, edges, corners and planes of a mesh, as JSON.
 #[pyfunction]
 #[pyo3(signature = (mesh, touches))]
 pub fn features(

@@ -123,7 +123,7 @@ fn off(place: &FeaturePlace, nominal: &Point3<f64>) -> f64 {
     let off = place.centre - nominal;
     match (place.kind, &place.axis) {
         (FeatureKind::Plane, Some(normal)) => off.dot(normal).abs(),
-        (FeatureKind::Corner, _) | (_, None) => off.norm(),
+        (FeatureKind::Corner | FeatureKind::Sphere, _) | (_, None) => off.norm(),
         (_, Some(axis)) => off.cross(axis).norm(),
     }
 }

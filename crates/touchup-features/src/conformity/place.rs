@@ -37,8 +37,8 @@ pub fn place_number(
 /// Standard uncertainty of the coordinate of a centre along a direction.
 ///
 /// The uncertainty of a centre is the root mean square distance across the axis, which two
-/// coordinates share; for a plane it is along its normal, for a corner the distance in space, which
-/// three share.
+/// coordinates share; for a plane it is along its normal, for a corner or sphere the distance in
+/// space, which three share.
 ///
 /// - `std`: of the centre.
 /// - `direction`: unit vector.
@@ -51,7 +51,7 @@ fn coordinate_std(
 ) -> Option<f64> {
     let along = axis.map(|axis| axis.dot(direction).abs());
     match (kind, along) {
-        (FeatureKind::Corner, _) => Some(std / 3f64.sqrt()),
+        (FeatureKind::Corner | FeatureKind::Sphere, _) => Some(std / 3f64.sqrt()),
         (FeatureKind::Plane, Some(along)) => (along >= ALONG).then_some(std),
         (_, Some(along)) => (along <= SQUARE).then_some(std / 2f64.sqrt()),
         (_, None) => None,
@@ -59,7 +59,7 @@ fn coordinate_std(
 }
 
 /// Position of a centre: twice its distance from the nominal one across the axis [ISO 1101:2017,
-/// cylindrical zone]; `None` for a plane or a corner. Its standard uncertainty is twice that of one
+/// cylindrical zone]; `None` for a plane, corner or sphere. Its standard uncertainty is twice that of one
 /// coordinate.
 ///
 /// - `centre`, `nominal`: in one unit, which the result has too; `std` of the centre as well.
@@ -72,7 +72,10 @@ fn position(
     nominal: &Point3<f64>,
 ) -> Option<MeasuredNumber> {
     let off = centre - nominal;
-    if matches!(kind, FeatureKind::Plane | FeatureKind::Corner) {
+    if matches!(
+        kind,
+        FeatureKind::Plane | FeatureKind::Corner | FeatureKind::Sphere
+    ) {
         return None;
     }
     let distance = off.cross(&axis?).norm();

@@ -197,7 +197,8 @@ fn is_along(cone: &Primitive, wall: &Wall) -> bool {
             .is_some_and(|apex| off(apex) < NEAR * wall.radius())
 }
 
-/// Faces on the cone, connected with `seeds`, without planes and round walls.
+/// Faces on the cone, connected with `seeds`, without those of a sphere: a ball-nosed end looks like a
+/// cone at its wall.
 fn faces_on(
     parted: &SegmentedMesh,
     mut seeds: Vec<u32>,
@@ -205,7 +206,15 @@ fn faces_on(
     tolerance: f64,
 ) -> Vec<u32> {
     let facets = &parted.facets;
-    let is_on = |face: u32| belongs(facets, face, cone, tolerance);
+    let is_of_sphere = |face: u32| {
+        let number = parted.segmentation.of_face[face as usize];
+        number != NONE
+            && matches!(
+                parted.segment(number as usize).primitive,
+                Primitive::Sphere(_)
+            )
+    };
+    let is_on = |face: u32| !is_of_sphere(face) && belongs(facets, face, cone, tolerance);
     seeds.retain(|&face| is_on(face));
     let mut seen: BTreeSet<u32> = seeds.iter().copied().collect();
     let is_new = |other| other != NONE && seen.insert(other) && is_on(other);

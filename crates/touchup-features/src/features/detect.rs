@@ -11,8 +11,10 @@ use super::holes::{Boss, Hole, bosses, groups, holes};
 use super::measure::{FittedSurface, Measure};
 use super::observe::{NOT_ALIKE, SegmentTouches};
 use super::rims::{OpeningOutline, RoundOpening, outlines, rims};
+use super::segmentation::primitive::Primitive;
 use super::segmentation::scene::{SegmentedMesh, numbered_by_place};
 use super::shafts::is_shaft;
+use super::spheres::sphere_features;
 use super::surfaces::{claim, touched_surfaces};
 use super::voids::{Slot, undercut_groups, voids};
 use super::walls::{ALL_AROUND, SAME_WALL, Wall};
@@ -25,7 +27,7 @@ use touchup_method::stylus::ProbedPoint;
 pub struct Detection {
     /// by kind, the largest first; numbered from 0 on
     pub features: Vec<Feature>,
-    /// share of the area that no plane, cylinder or cone explains
+    /// share of the area that no plane, cylinder, cone or sphere explains
     pub unexplained: f64,
     /// errors of the touches that do not repeat
     pub noise: TouchNoise,
@@ -96,11 +98,9 @@ fn detected<T>(
         .chain(raised)
         .collect();
     features.extend(without_second_walls(raised));
-    features.extend(
-        shafts
-            .iter()
-            .map(|&at| cylinder_feature(&measure, &walls[at])),
-    );
+    let shafts = shafts.iter();
+    features.extend(shafts.map(|&at| cylinder_feature(&measure, &walls[at])));
+    features.extend(sphere_features(&measure));
     features.extend(edges.iter().filter_map(|edge| edge_feature(&measure, edge)));
     features.extend(corners(&parted, &measure, &edges));
     features.extend(plane_features(&measure));
@@ -596,7 +596,7 @@ fn rim_feature(measure: &Measure, rim: &RoundOpening) -> Feature {
 const BROKEN_EDGE: f64 = 1.25;
 
 /// Cuts into the planes of a drawing, and bosses on them, of any outline, except for these walls,
-/// slots and pockets.
+/// slots and pockets, and for spheres.
 fn of_other_outline(measure: &Measure, round: &[&Wall], flat: &[&Slot]) -> Vec<Feature> {
     let parted = measure.observed.parted;
     if parted.rounding.is_none() {
@@ -608,6 +608,9 @@ fn of_other_outline(measure: &Measure, round: &[&Wall], flat: &[&Slot]) -> Vec<F
     of_round
         .chain(of_flat)
         .for_each(|number| is_known[number] = true);
+    for (is_known, segment) in is_known.iter_mut().zip(&parted.segmentation.segments) {
+        *is_known |= matches!(segment.primitive, Primitive::Sphere(_));
+    }
     let is_new = |outline: &OpeningOutline| {
         let (rim, radius) = (&outline.rim, outline.rim.fit.surface.radius);
         let is_broken = |wall: &&Wall| is_rim_of(wall, rim) && radius < BROKEN_EDGE * wall.radius();

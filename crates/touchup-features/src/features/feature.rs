@@ -29,6 +29,8 @@ names! {
         Cylinder = "cylinder",
         /// a round cut at the rim of the part, open to the side
         Notch = "notch",
+        /// a dome, a seat, or the end of a ball-nosed tool
+        Sphere = "sphere",
     }
 }
 
@@ -77,15 +79,16 @@ pub struct Feature {
     /// kind of feature
     pub kind: FeatureKind,
     /// intersection of the axis with the opening; middle of a boss' foot, of a shaft's shoulder or
-    /// else of its length, of an edge, of a plane; the corner. Its uncertainty is the root mean
-    /// square distance across the axis, for a plane along the normal.
+    /// else of its length, of an edge, of a plane; the corner; the centre of a sphere. Its
+    /// uncertainty is the root mean square distance across the axis, for a plane along the normal,
+    /// for a corner or sphere in space.
     pub centre: MeasuredValue<Point3<f64>>,
     /// out of the opening, along an edge, the outward normal of a plane; unit vector. Its
     /// uncertainty is an angle, rad.
     pub axis: Option<MeasuredValue<Vector3<f64>>>,
     /// along a slot, unit vector
     pub direction: Option<Vector3<f64>>,
-    /// of a hole, notch, boss or cylinder, m
+    /// of a hole, notch, boss, cylinder or sphere, m
     pub diameter: Option<MeasuredValue<f64>>,
     /// of a slot, pocket, edge or cylinder, m; `None`: the ends of touched walls are untouched
     pub length: Option<MeasuredValue<f64>>,
@@ -104,7 +107,7 @@ pub struct Feature {
     pub group: Option<u32>,
     /// both ends of an edge or slot, m
     pub points: Vec<Point3<f64>>,
-    /// whether the material is inside of an edge
+    /// whether the material is inside of an edge or sphere
     pub is_convex: Option<bool>,
     /// touched share of its surface
     pub touched: f64,

@@ -7,8 +7,8 @@ use nalgebra::{Point3, Vector3};
 
 use super::feature::{FittedTo, MeasuredValue};
 use super::fit::{
-    Cone, Cylinder, Ends, Fit, FitParams, Freedom, Observation, Plane, Stadium, SurfaceModel, fit,
-    fit_mesh,
+    Cone, Cylinder, Ends, Fit, FitParams, Freedom, Observation, Plane, Sphere, Stadium,
+    SurfaceModel, fit, fit_mesh,
 };
 use super::observe::SegmentTouches;
 use super::segmentation::primitive::Primitive;
@@ -163,19 +163,25 @@ impl<'a> Measure<'a> {
         let Primitive::Cylinder(guess) = self.observed.parted.segment(number).primitive else {
             return None;
         };
-        let touches = self.observed.touches_of(&[number]);
-        let touches = if touches.len() < LEAST_TOUCHES {
-            Vec::new()
-        } else {
-            touches
+        Some(self.fitted_if_felt(number, &guess))
+    }
+
+    /// The sphere of a segment; `None` for other segments.
+    pub(crate) fn sphere(&self, number: usize) -> Option<FittedSurface<Sphere>> {
+        let Primitive::Sphere(guess) = self.observed.parted.segment(number).primitive else {
+            return None;
         };
-        Some(self.fitted(
-            &guess,
-            touches,
-            &self.observed.of_mesh(&[number]),
-            None,
-            None,
-        ))
+        Some(self.fitted_if_felt(number, &guess))
+    }
+
+    /// A surface by the touches of its segment, if enough, else by its mesh.
+    fn fitted_if_felt<S: SurfaceModel>(&self, number: usize, guess: &S) -> FittedSurface<S> {
+        let mut touches = self.observed.touches_of(&[number]);
+        if touches.len() < LEAST_TOUCHES {
+            touches.clear();
+        }
+        let of_mesh = self.observed.of_mesh(&[number]);
+        self.fitted(guess, touches, &of_mesh, None, None)
     }
 
     /// The cylinder of a wall.

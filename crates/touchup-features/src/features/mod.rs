@@ -1,6 +1,7 @@
-//! Features of a mesh and its touches: holes, slots, pockets, bosses, edges, corners and planes.
+//! Features of a mesh and its touches: holes, slots, pockets, bosses, spheres, edges, corners and
+//! planes.
 //!
-//! [`detect`] segments the mesh into planes, cylinders and cones, names the features that they
+//! [`detect`] segments the mesh into planes, cylinders, cones and spheres, names the features that they
 //! form, and measures each by its touches if there are enough, else by the mesh. [`curvature`] and
 //! its [`clusters`] are the paper's method for the places of features.
 
@@ -21,6 +22,7 @@ mod relations;
 mod rims;
 mod segmentation;
 mod shafts;
+mod spheres;
 mod surfaces;
 mod track;
 mod voids;

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 
 use super::fit::{FitParams, Observation, SurfaceModel, TouchNoise, Visit};
 use super::segmentation::facets::NONE;
@@ -457,6 +457,8 @@ fn is_on_chord(
             .apex()
             .and_then(|apex| (p - apex).try_normalize(0.0))
             .unwrap_or_default(),
+        // it has no straight lines
+        Primitive::Sphere(_) => Vector3::zeros(),
     };
     let around = distinct(faces.iter().flat_map(|&face| mesh.corners(face)));
     let around: Vec<Point3<f64>> = around
@@ -513,8 +515,6 @@ pub(super) fn groups(touches: &[ProbedPoint]) -> Vec<u32> {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::Vector3;
-
     use super::*;
 
     /// Stamps in ms and strokes; the third touch begins a group of its own, and the second stroke

@@ -9,7 +9,7 @@ names! {
     /// A toleranced quantity of a drawing, by its name with its unit.
     #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
     pub enum InspectedQuantity {
-        /// of a hole, notch, boss or cylinder
+        /// of a hole, notch, boss, cylinder or sphere
         Diameter = "diameter_mm",
         /// of a slot or pocket
         Width = "width_mm",
@@ -123,7 +123,8 @@ impl InspectedQuantity {
         );
         let is_slot = matches!(kind, FeatureKind::Slot | FeatureKind::Pocket);
         match self {
-            Self::Diameter | Self::Roundness | Self::Cylindricity | Self::Straightness => is_round,
+            Self::Diameter => is_round || kind == FeatureKind::Sphere,
+            Self::Roundness | Self::Cylindricity | Self::Straightness => is_round,
             Self::Width => is_slot,
             Self::Length => is_slot || matches!(kind, FeatureKind::Edge | FeatureKind::Cylinder),
             Self::Depth => {
@@ -135,7 +136,10 @@ impl InspectedQuantity {
             }
             Self::ConeAngle => kind == FeatureKind::Hole,
             Self::Flatness => kind == FeatureKind::Plane,
-            Self::Position => !matches!(kind, FeatureKind::Plane | FeatureKind::Corner),
+            Self::Position => !matches!(
+                kind,
+                FeatureKind::Plane | FeatureKind::Corner | FeatureKind::Sphere
+            ),
             _ => true,
         }
     }

@@ -100,7 +100,7 @@ impl Wall {
         Some(Self { is_edge, ..wall })
     }
 
-    /// The wall of these faces; `None` for a plane.
+    /// The wall of these faces; `None` for a plane or a sphere.
     pub(crate) fn of_faces(
         facets: &Facets,
         primitive: &Primitive,
@@ -110,7 +110,7 @@ impl Wall {
         Self::of_evidence(facets, primitive, faces, &[], segments)
     }
 
-    /// The wall of these faces and places of contacts; `None` for a plane.
+    /// The wall of these faces and places of contacts; `None` for a plane or a sphere.
     #[expect(clippy::too_many_lines)]
     fn of_evidence(
         facets: &Facets,
@@ -120,7 +120,7 @@ impl Wall {
         segments: Vec<usize>,
     ) -> Option<Self> {
         let (origin, axis, radius_at_origin, half_angle, is_concave) = match primitive {
-            Primitive::Plane(_) => return None,
+            Primitive::Plane(_) | Primitive::Sphere(_) => return None,
             Primitive::Cylinder(wall) => {
                 (wall.center(), wall.axis(), wall.radius, None, wall.concave)
             }

@@ -13,7 +13,7 @@ pub struct NominalRecord {
     /// unique name in the report
     pub name: String,
     /// of the feature: `hole`, `slot`, `pocket`, `boss`, `edge`, `corner`, `plane`, `cylinder`,
-    /// `notch`
+    /// `notch`, `sphere`
     pub kind: String,
     /// inspected quantity, with its unit, such as `diameter_mm`
     pub quantity: String,

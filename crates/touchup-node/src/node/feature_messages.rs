@@ -298,6 +298,7 @@ fn body(feature: &FeatureMsg, base: &Marker) -> Option<Marker> {
     match feature.kind {
         FeatureMsg::KIND_HOLE | FeatureMsg::KIND_BOSS => Some(cylinder(feature, base)),
         FeatureMsg::KIND_CORNER => Some(sphere(3.0 * LINE)),
+        FeatureMsg::KIND_SPHERE => Some(sphere(feature.diameter)),
         FeatureMsg::KIND_EDGE | FeatureMsg::KIND_SLOT | FeatureMsg::KIND_POCKET => {
             Some(outline(feature, base)).filter(|line| line.points.len() > 1)
         }
@@ -450,6 +451,7 @@ mod tests {
             (FeatureKind::Plane, FeatureMsg::KIND_PLANE),
             (FeatureKind::Cylinder, FeatureMsg::KIND_CYLINDER),
             (FeatureKind::Notch, FeatureMsg::KIND_NOTCH),
+            (FeatureKind::Sphere, FeatureMsg::KIND_SPHERE),
         ];
         assert_eq!(numbers.map(|(kind, _)| kind), FeatureKind::ALL);
         for (kind, number) in numbers {
@@ -459,8 +461,8 @@ mod tests {
         }
         assert_eq!(kind_of(FeatureMsg::KIND_UNKNOWN), Ok(None));
         assert_eq!(
-            kind_of(10),
-            Err("there is no kind 10: 0 to 9 are".to_owned())
+            kind_of(11),
+            Err("there is no kind 11: 0 to 10 are".to_owned())
         );
     }
 

@@ -114,8 +114,9 @@ pub struct ParameterDescriptor {
 pub const CELL_FRAME: &str = "cell";
 
 /// Names of the kinds of features, by their number in messages.
-pub const KIND_NAMES: [&str; 10] = [
+pub const KIND_NAMES: [&str; 11] = [
     "unknown", "hole", "slot", "pocket", "boss", "edge", "corner", "plane", "cylinder", "notch",
+    "sphere",
 ];
 
 /// All parameters of the node, those of docs/ros.md and the common one of all nodes.

@@ -72,7 +72,10 @@ impl DecisionGoal {
         match quantity {
             X | Y | Z => !matches!(
                 kind,
-                FeatureKind::Corner | FeatureKind::Cylinder | FeatureKind::Notch
+                FeatureKind::Corner
+                    | FeatureKind::Cylinder
+                    | FeatureKind::Notch
+                    | FeatureKind::Sphere
             ),
             Position => matches!(
                 kind,

@@ -99,7 +99,12 @@ impl Explorer {
             Some(FeatureKind::Boss) => Box::new(boss::BossPattern::new()),
             Some(FeatureKind::Edge) => Box::new(edge::EdgePattern::new()),
             Some(FeatureKind::Plane) => Box::new(plane::PlanePattern::new(&params)),
-            Some(kind @ (FeatureKind::Corner | FeatureKind::Cylinder | FeatureKind::Notch)) => {
+            Some(
+                kind @ (FeatureKind::Corner
+                | FeatureKind::Cylinder
+                | FeatureKind::Notch
+                | FeatureKind::Sphere),
+            ) => {
                 return Err(ExploreError::NoPattern { kind: kind.name() });
             }
             None => Box::new(region::RegionPattern::new(&params)),

@@ -79,7 +79,7 @@ class Features(TypedDict, total=False):
 
 
 def features(mesh: MeshLike, touches: Touches | None = None, *, unit: Unit = "m") -> Features:
-    """Finds holes, slots, pockets, bosses, edges, corners and planes, and measures them.
+    """Finds holes, slots, pockets, bosses, spheres, edges, corners and planes, and measures them.
 
     - `touches`: measure the features under them, as in `Refined.touches`; without touches the mesh does.
     - `unit`: of the coordinates of `mesh`, unless it is a `Mesh`.

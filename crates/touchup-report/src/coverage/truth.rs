@@ -86,9 +86,11 @@ pub(super) fn feature_numbers(
             .find_map(|truth| of_walls(feature, truth)),
         FeatureKind::Plane => of_plane(feature, plate),
         FeatureKind::Edge => of_edge(feature, plate),
-        FeatureKind::Pocket | FeatureKind::Corner | FeatureKind::Cylinder | FeatureKind::Notch => {
-            None
-        }
+        FeatureKind::Pocket
+        | FeatureKind::Corner
+        | FeatureKind::Cylinder
+        | FeatureKind::Notch
+        | FeatureKind::Sphere => None,
     }
     .unwrap_or_default();
     if feature.fitted_to == FittedTo::Mesh {

@@ -8,6 +8,7 @@ mod drawn_plate;
 mod expected;
 mod laws;
 mod sheets;
+mod spheres;
 
 use nalgebra::Point3;
 use touchup::features::{Feature, FeatureKind, detect};

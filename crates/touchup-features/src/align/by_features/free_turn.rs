@@ -72,6 +72,7 @@ fn axis_of(landmarks: &[&Landmark], near: f64) -> Option<FreeTurn> {
         match landmark.kind {
             FeatureKind::Plane => is_along,
             FeatureKind::Hole | FeatureKind::Boss | FeatureKind::Cylinder => is_along && is_on,
+            FeatureKind::Sphere => is_on,
             FeatureKind::Slot
             | FeatureKind::Pocket
             | FeatureKind::Edge

@@ -120,7 +120,7 @@ impl Landmark {
     pub(crate) fn weight(&self) -> f64 {
         match self.kind {
             FeatureKind::Hole | FeatureKind::Slot | FeatureKind::Pocket | FeatureKind::Boss => 1.0,
-            FeatureKind::Corner => 0.5,
+            FeatureKind::Corner | FeatureKind::Sphere => 0.5,
             FeatureKind::Edge => 0.25,
             FeatureKind::Cylinder if self.is_step => 1.0,
             FeatureKind::Plane | FeatureKind::Cylinder | FeatureKind::Notch => 0.2,

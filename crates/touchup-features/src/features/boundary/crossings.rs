@@ -2,11 +2,12 @@
 
 use std::f64::consts::TAU;
 
-use nalgebra::{Point3, Vector2};
+use nalgebra::{Point3, Vector2, Vector3};
 
 use touchup_geometry::brep::{
     AnalyticSurface, BrepEdge, BrepFace, BrepParts, OrientedEdge, SurfaceShape,
 };
+use touchup_geometry::numeric::length_and_direction;
 
 /// Distance of a crossing of edges from a vertex that makes it none, in their tolerances.
 const NEAR_VERTEX: f64 = 3.0;
@@ -103,7 +104,7 @@ struct FlatLoops {
     pieces: Vec<LoopPiece>,
     /// vertices, m
     ends: Vec<Vector2<f64>>,
-    /// length of a turn of the surface along x, m; 0 of a plane
+    /// length of a turn of the surface along x, m; 0 of a plane or sphere
     turn: f64,
 }
 
@@ -176,16 +177,20 @@ impl FlatLoops {
 }
 
 /// Coordinates of a point of a surface in a plane, m: of a round one along the turn, at its own
-/// radius, and along the axis.
+/// radius, and along the axis; of a sphere away from its pole.
 fn flat(surface: &AnalyticSurface, p: &Point3<f64>) -> Vector2<f64> {
     let at = surface.placement.local(p);
     match surface.shape {
         SurfaceShape::Plane => at.xy(),
+        SurfaceShape::Sphere { radius } => {
+            let (across, away) = length_and_direction(&Vector3::new(at.x, at.y, 0.0));
+            away.xy() * (radius * across.atan2(at.z))
+        }
         _ => Vector2::new(at.y.atan2(at.x) * section_radius(surface), at.z),
     }
 }
 
-/// Radius of a cylinder, or of a cone at its origin, m; 0 of a plane.
+/// Radius of a cylinder, or of a cone at its origin, m; 0 of a plane or sphere.
 fn section_radius(surface: &AnalyticSurface) -> f64 {
     match surface.shape {
         SurfaceShape::Cylinder { radius } => radius,
@@ -198,7 +203,6 @@ fn section_radius(surface: &AnalyticSurface) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::Vector3;
     use touchup_geometry::brep::{FaceLoop, intersection};
 
     /// Faces of the plane z = 0 bounded by polygons.

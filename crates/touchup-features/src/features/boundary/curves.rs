@@ -6,8 +6,10 @@ use super::polyline::smoothed;
 use super::scale::BoundaryScale;
 use super::settle::{farthest, on_all};
 use super::surfaces::PartSurface;
-use touchup_geometry::brep::{AnalyticSurface, CurveNode, SpaceCurve, SurfaceShape, intersection};
-use touchup_geometry::numeric::{direction, mean};
+use touchup_geometry::brep::{
+    AnalyticSurface, AxisPlacement, CurveNode, SpaceCurve, SurfaceShape, intersection,
+};
+use touchup_geometry::numeric::{direction, length_and_direction, mean};
 
 /// Maximum distance of a spline from its surfaces between nodes, m.
 const FIT: f64 = 1e-7;
@@ -71,10 +73,10 @@ pub(super) fn meeting(
     })
 }
 
-/// Radius of the smaller cylinder, m; 0 without one.
+/// Radius of the smaller cylinder or sphere, m; 0 without one.
 fn radius_of(pair: [&AnalyticSurface; 2]) -> f64 {
     let radii = pair.map(|one| match one.shape {
-        SurfaceShape::Cylinder { radius } => radius,
+        SurfaceShape::Cylinder { radius } | SurfaceShape::Sphere { radius } => radius,
         _ => f64::INFINITY,
     });
     let least = radii[0].min(radii[1]);
@@ -91,18 +93,24 @@ fn reach_of(curve: &SpaceCurve, points: &[Point3<f64>]) -> f64 {
     points.iter().map(|p| curve.distance(p)).fold(0.0, f64::max)
 }
 
-/// The feet of points on a line.
-fn points_along(line: &SpaceCurve, points: &[Point3<f64>]) -> impl Iterator<Item = Point3<f64>> {
-    let foot = |p: &Point3<f64>| match line {
+/// The feet of points on a line or circle.
+fn points_along(curve: &SpaceCurve, points: &[Point3<f64>]) -> impl Iterator<Item = Point3<f64>> {
+    let foot = |p: &Point3<f64>| match curve {
         SpaceCurve::Line { origin, direction } => origin + direction * (p - origin).dot(direction),
+        SpaceCurve::Circle { placement, radius } => {
+            let at = placement.local(p);
+            let (_, away) = length_and_direction(&Vector3::new(at.x, at.y, 0.0));
+            placement.place(radius * away.x, radius * away.y, 0.0)
+        }
         _ => *p,
     };
     points.iter().map(foot)
 }
 
-/// The line along which a cylinder touches a plane or a parallel cylinder, midway between both.
+/// The line along which a cylinder touches a plane or a parallel cylinder, or the circle along which
+/// it touches a sphere about its axis, midway between both.
 fn tangency(pair: [&AnalyticSurface; 2], points: &[Point3<f64>]) -> Option<SpaceCurve> {
-    use SurfaceShape::{Cylinder, Plane};
+    use SurfaceShape::{Cylinder, Plane, Sphere};
     let middle = Point3::from(mean(points.iter().map(|p| p.coords)));
     let on_axis = |of: &AnalyticSurface| {
         let (origin, axis) = (of.placement.origin, of.placement.axis);
@@ -141,6 +149,18 @@ fn tangency(pair: [&AnalyticSurface; 2], points: &[Point3<f64>]) -> Option<Space
             let nearest = pairs.into_iter().min_by(|x, y| gap(x).total_cmp(&gap(y)))?;
             let along = axes[0] + axes[1] * axes[0].dot(&axes[1]).signum();
             line(a + out * ((nearest[0] + nearest[1]) / 2.0), along)
+        }
+        (Sphere { .. }, Cylinder { .. }) => tangency([pair[1], pair[0]], points),
+        (Cylinder { radius }, Sphere { radius: of_sphere }) => {
+            let [axis, centre] = pair.map(|one| one.placement);
+            let off = axis.local(&centre.origin).z;
+            Some(SpaceCurve::Circle {
+                placement: AxisPlacement {
+                    origin: nalgebra::center(&(axis.origin + axis.axis * off), &centre.origin),
+                    ..axis
+                },
+                radius: (radius + of_sphere) / 2.0,
+            })
         }
         _ => None,
     }

@@ -10,7 +10,7 @@ use touchup_geometry::brep::{
 };
 
 /// The face of a region with its loops, the outer one of a plane first, without those along an edge
-/// and back; a cone around its apex ends there.
+/// and back; a cone around its apex ends there, and a whole sphere has a pole.
 pub(super) fn face_of(
     parts: &mut BrepParts,
     surface: &PartSurface,
@@ -34,15 +34,20 @@ pub(super) fn face_of(
         .into_iter()
         .map(|(_, edges)| FaceLoop::Edges(edges));
     let mut loops: Vec<_> = loops.collect();
+    let place = own.placement;
     let (kind, apex) = match own.shape {
         SurfaceShape::Plane => ("plane", None),
         SurfaceShape::Cone { radius, half_angle } => {
-            let apex = own.placement.origin - own.placement.axis * (radius / half_angle.tan());
-            ("cone", Some(apex))
+            let apex = place.origin - place.axis * (radius / half_angle.tan());
+            ("cone", Some(apex).filter(|_| turn.abs() > PI))
         }
-        _ => ("cylinder", None),
+        SurfaceShape::Sphere { radius } => {
+            let pole = place.origin + place.axis * radius;
+            ("sphere", Some(pole).filter(|_| loops.is_empty()))
+        }
+        SurfaceShape::Cylinder { .. } => ("cylinder", None),
     };
-    if let Some(apex) = apex.filter(|_| turn.abs() > PI) {
+    if let Some(apex) = apex {
         loops.push(FaceLoop::Vertex(parts.vertex(apex)));
     }
     let support = if surface.is_touched {

@@ -3,7 +3,7 @@
 use nalgebra::{Point3, Vector3};
 
 use crate::features::feature::FittedTo;
-use crate::features::fit::{Cone, Cylinder, Ends, Fit, Freedom, Plane, SurfaceModel};
+use crate::features::fit::{Cone, Cylinder, Ends, Fit, Freedom, Plane, Sphere, SurfaceModel};
 use crate::features::holes::{Boss, Hole};
 use crate::features::measure::{FittedSurface, Measure};
 use crate::features::segmentation::primitive::Primitive;
@@ -134,8 +134,12 @@ fn is_seen(parted: &SegmentedMesh, walls: &[Wall], number: usize, least_size: f6
     let places = segment.faces.iter();
     let places = places.map(|&face| parted.facets.mesh.barycentre(FaceId(face)).coords);
     let [_, across, _] = spreads(places);
-    let is_plane = segment.primitive.plane().is_some() && across >= SPREAD * least_size;
-    parted.is_large(segment.area) && parted.is_sure(number) && (is_round || is_plane)
+    let is_wide = match &segment.primitive {
+        Primitive::Plane(_) => across >= SPREAD * least_size,
+        Primitive::Sphere(sphere) => sphere.radius >= least_size,
+        _ => is_round,
+    };
+    parted.is_large(segment.area) && parted.is_sure(number) && is_wide
 }
 
 fn is_on(parted: &SegmentedMesh, number: usize, surface: &PartSurface) -> bool {
@@ -226,6 +230,10 @@ fn of_segment_alone(measure: &Measure, number: usize) -> PartSurface {
     if let Some(cylinder) = measure.shaft(number) {
         return of_cylinder(&cylinder, segment.tolerance);
     }
+    if let Some(sphere) = measure.sphere(number) {
+        let middle = middle_of(parted, &segment.faces);
+        return of_sphere(&sphere, &middle, segment.tolerance);
+    }
     let wall = Wall::of_faces(
         &parted.facets,
         &segment.primitive,
@@ -244,6 +252,7 @@ fn of_primitive(primitive: &Primitive, tolerance: f64) -> PartSurface {
         Primitive::Plane(plane) => (plane_at(plane, &plane.point()), true),
         Primitive::Cylinder(cylinder) => (cylinder_of(cylinder), !cylinder.concave),
         Primitive::Cone(cone) => (cone_of(cone), !cone.concave),
+        Primitive::Sphere(sphere) => (sphere_of(sphere, Vector3::z()), !sphere.concave),
     };
     PartSurface {
         surface,
@@ -324,6 +333,18 @@ fn of_cone(cone: &FittedSurface<Cone>, tolerance: f64) -> PartSurface {
     })
 }
 
+/// - `middle`: of its faces; the pole is there, so that no edge runs over it.
+fn of_sphere(sphere: &FittedSurface<Sphere>, middle: &Point3<f64>, tolerance: f64) -> PartSurface {
+    let own = &sphere.surface;
+    let surface = sphere_of(own, middle - own.center());
+    fitted(sphere, surface, !own.concave, tolerance, |fit| {
+        vec![
+            ("diameter_mm", fit.std_by(&[(Freedom::Size, 2.0)]), LENGTH),
+            ("position_mm", fit.centre_std(), LENGTH),
+        ]
+    })
+}
+
 /// - `near`: its foot is the origin.
 fn plane_at(plane: &Plane, near: &Point3<f64>) -> AnalyticSurface {
     let normal = plane.normal();
@@ -346,6 +367,14 @@ fn cone_of(cone: &Cone) -> AnalyticSurface {
     };
     let placement = AxisPlacement::along(cone.center(), cone.axis() * cone.half_angle.signum());
     AnalyticSurface { placement, shape }
+}
+
+/// - `pole`: of any length but 0.
+fn sphere_of(sphere: &Sphere, pole: Vector3<f64>) -> AnalyticSurface {
+    let shape = SurfaceShape::Sphere {
+        radius: sphere.radius,
+    };
+    AnalyticSurface::along(sphere.center(), pole, shape)
 }
 
 fn middle_of(parted: &SegmentedMesh, faces: &[u32]) -> Point3<f64> {

@@ -220,7 +220,7 @@ mod tests {
                 lean.sin() * turn.sin(),
                 -lean.cos(),
             );
-            let error = if i % 2 == 0 { 5e-6 } else { -5e-6 };
+            let error = if i.is_multiple_of(2) { 5e-6 } else { -5e-6 };
             centre + out * (radius + error)
         };
         let points: Vec<_> = (0..400).map(point).collect();

@@ -1,5 +1,5 @@
-//! Segmentation of a mesh into planes and cylinders; cones beside holes follow once those are
-//! known.
+//! Segmentation of a mesh into planes and cylinders; spheres follow from their pieces, and cones
+//! beside holes once those are known.
 //!
 //! From the flattest faces on, each free face is the seed of a region: a plane or a cylinder fitted
 //! to the faces around it grows over neighbours with corners on it and like normals. A plane that
@@ -34,9 +34,9 @@ const WIDER: f64 = 3.0;
 /// Number of tolerances.
 const RUNGS: i32 = 3;
 /// Maximum distance of a corner, in root mean squares of the faces around the seed.
-const SPREAD: f64 = 4.0;
+pub(super) const SPREAD: f64 = 4.0;
 /// Maximum tolerance of a round surface, in its radii.
-const SHARPNESS: f64 = 0.08;
+pub(super) const SHARPNESS: f64 = 0.08;
 /// Maximum number of faces in the fit of a plane while it grows.
 const MOST_OF_PLANE: usize = 20_000;
 /// Motion of a converged primitive, as a share of the tolerance.
@@ -548,6 +548,13 @@ impl MeshScale {
             .into_iter()
             .chain(loose)
             .collect()
+    }
+
+    /// The same for spheres: a drawing's are exact, and of a scan no more than waves count.
+    pub(super) fn of_spheres(&self, is_drawn: bool) -> Vec<(f64, f64)> {
+        let mut tolerances = self.tolerances(is_drawn);
+        tolerances.truncate(if is_drawn { 1 } else { 2 });
+        tolerances
     }
 
     /// Tolerance of a drawing, m.

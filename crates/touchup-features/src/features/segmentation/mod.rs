@@ -13,3 +13,4 @@ pub(super) mod primitive;
 pub(super) mod rays;
 pub(super) mod scene;
 pub(super) mod segment;
+mod spheres;

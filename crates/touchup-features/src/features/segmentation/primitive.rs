@@ -4,7 +4,7 @@
 use nalgebra::{Matrix2, Matrix3, Point3, SVector, Vector2, Vector3};
 
 use super::facets::Facets;
-use crate::features::fit::{Cone, Cylinder, FREEDOMS, Freedom, Plane, Steps, SurfaceModel};
+use crate::features::fit::{Cone, Cylinder, FREEDOMS, Freedom, Plane, Sphere, Steps, SurfaceModel};
 use touchup_geometry::mesh::{FaceId, VertexId};
 use touchup_geometry::numeric::{NormalEquations, tangent_basis, thinnest_direction};
 
@@ -17,6 +17,8 @@ pub(crate) enum Primitive {
     Cylinder(Cylinder),
     /// radius growing along its axis
     Cone(Cone),
+    /// one distance from its centre
+    Sphere(Sphere),
 }
 
 impl Primitive {
@@ -27,6 +29,7 @@ impl Primitive {
             Self::Plane(plane) => plane.distance_and_normal(p),
             Self::Cylinder(cylinder) => cylinder.distance_and_normal(p),
             Self::Cone(cone) => cone.distance_and_normal(p),
+            Self::Sphere(sphere) => sphere.distance_and_normal(p),
         }
     }
 
@@ -37,6 +40,7 @@ impl Primitive {
             Self::Plane(plane) => plane.distance(p),
             Self::Cylinder(cylinder) => cylinder.distance(p),
             Self::Cone(cone) => cone.distance(p),
+            Self::Sphere(sphere) => sphere.distance(p),
         }
     }
 
@@ -75,6 +79,7 @@ pub(in crate::features) fn belongs(
         }
         Primitive::Cylinder(cylinder) => normal_beneath(facets, face, cylinder, tolerance),
         Primitive::Cone(cone) => normal_beneath(facets, face, cone, tolerance),
+        Primitive::Sphere(sphere) => normal_beneath(facets, face, sphere, tolerance),
     };
     normal.is_some_and(|normal| {
         facets.normal(face).dot(&normal) > FACES_ALIKE || {
@@ -284,6 +289,10 @@ pub(in crate::features) fn refined(
             let cone = moved_to::<_, 6>(cone, facets, faces, |cone| cone.radius, false);
             cone.filter(|cone| cone.half_angle > 0.0)
                 .map(Primitive::Cone)
+        }
+        Primitive::Sphere(sphere) => {
+            moved_to::<_, 4>(sphere, facets, faces, |sphere| sphere.radius, false)
+                .map(Primitive::Sphere)
         }
     }
 }

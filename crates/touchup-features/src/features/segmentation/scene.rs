@@ -94,14 +94,15 @@ impl<'a> SegmentedMesh<'a> {
         let facets = Facets::of(mesh);
         let scale = MeshScale::of(&facets);
         let mut segmentation = Segmentation::of(&facets, scale);
-        segmentation.join_chords(&facets, scale.chords());
-        let bodies = Bodies::of(&facets);
         let exact = segmentation
             .segments
             .iter()
             .filter(|segment| segment.is_exact)
             .map(|segment| segment.tolerance);
         let rounding = exact.min_by(f64::total_cmp);
+        segmentation.add_spheres(&facets, scale, rounding.is_some());
+        segmentation.join_chords(&facets, scale.chords());
+        let bodies = Bodies::of(&facets);
         Self {
             rounding,
             facets,
@@ -168,7 +169,7 @@ impl<'a> SegmentedMesh<'a> {
     }
 
     /// Distance from `from` along the unit vector `direction` to the exit from a segment's surface,
-    /// m; `None`: no hit, or a cone.
+    /// m; `None`: no hit, a cone, or a sphere.
     pub(crate) fn exit(
         &self,
         number: usize,
@@ -178,7 +179,7 @@ impl<'a> SegmentedMesh<'a> {
         match &self.segment(number).primitive {
             Primitive::Plane(plane) => plane.along(from, direction),
             Primitive::Cylinder(cylinder) => cylinder.exit(from, direction),
-            Primitive::Cone(_) => None,
+            Primitive::Cone(_) | Primitive::Sphere(_) => None,
         }
     }
 

@@ -93,7 +93,8 @@ impl Segmentation {
             else {
                 continue;
             };
-            if primitive.plane().is_some() {
+            // a sphere would take the first ring of a surface that it touches
+            if matches!(primitive, Primitive::Plane(_) | Primitive::Sphere(_)) {
                 continue;
             }
             let is_on = |&face: &u32| belongs(facets, face, &primitive, tolerance);

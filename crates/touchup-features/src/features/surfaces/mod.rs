@@ -88,7 +88,7 @@ fn borders(costs: &Costs, regions: &[SurfaceRegion]) -> Vec<(Primitive, Vec<u32>
         let is_outside = match &region.shape.primitive {
             Primitive::Plane(_) => true,
             Primitive::Cylinder(c) => !c.concave && c.radius > costs.contacts.radius,
-            Primitive::Cone(_) => false,
+            Primitive::Cone(_) | Primitive::Sphere(_) => false,
         };
         is_outside && region.gain > LAND_GAIN
     };

@@ -98,7 +98,7 @@ impl<'a> Proposals<'a> {
             match &best.shape.primitive {
                 Primitive::Plane(plane) => self.add_axis(plane.normal()),
                 Primitive::Cylinder(cylinder) => self.add_axis(cylinder.axis()),
-                Primitive::Cone(_) => {}
+                Primitive::Cone(_) | Primitive::Sphere(_) => {}
             }
             self.regions.push(best);
             for other in found {

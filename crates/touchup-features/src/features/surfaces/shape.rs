@@ -16,7 +16,8 @@ const LARGEST: f64 = 0.5;
 /// Half angles of a cone, rad: 6° to 83°.
 const HALF_ANGLES: std::ops::Range<f64> = 0.1..1.45;
 
-/// A surface, and whether its axis or normal is that of another one.
+/// A plane, cylinder or cone, and whether its axis or normal is that of another one. A sphere through
+/// touches would take those of short cones: touched spheres are measured where the mesh shows them.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct TouchedShape {
     pub primitive: Primitive,
@@ -39,7 +40,7 @@ impl TouchedShape {
         let kind = match self.primitive {
             Primitive::Plane(_) => 0,
             Primitive::Cylinder(_) => 1,
-            Primitive::Cone(_) => 2,
+            Primitive::Cone(_) | Primitive::Sphere(_) => 2,
         };
         kind + if self.is_held { KINDS / 2 } else { 0 }
     }
@@ -57,6 +58,7 @@ impl TouchedShape {
             Primitive::Plane(plane) => plane.normal(),
             Primitive::Cylinder(cylinder) => cylinder.axis(),
             Primitive::Cone(cone) => cone.axis(),
+            Primitive::Sphere(_) => return Vec::new(),
         };
         let held_to = |axis: &Vector3<f64>| {
             let lean = axis.dot(&own);
@@ -77,6 +79,7 @@ impl TouchedShape {
                     let (radius, half_angle) = (c.radius, c.half_angle);
                     Primitive::Cone(Cone::new(c.center(), &axis, radius, half_angle, c.concave))
                 }
+                Primitive::Sphere(_) => *primitive,
             };
             Some(Self {
                 primitive,
@@ -119,9 +122,10 @@ impl TouchedShape {
             (Primitive::Cone(cone), false) => {
                 Primitive::Cone(by.moved::<_, 6>(cone, contacts, false)?)
             }
+            (Primitive::Sphere(_), _) => return None,
         };
         let is_sound = match &primitive {
-            Primitive::Plane(_) => true,
+            Primitive::Plane(_) | Primitive::Sphere(_) => true,
             Primitive::Cylinder(c) => c.radius > 0.0 && c.radius < LARGEST,
             Primitive::Cone(c) => HALF_ANGLES.contains(&c.half_angle.abs()),
         };

@@ -34,7 +34,7 @@ impl<'a> AxisView<'a> {
         let is_closer = |at: &usize| match &segments[*at].primitive {
             Primitive::Cylinder(end) => end.concave && end.axis().dot(&axis).abs() > END_AXIS,
             Primitive::Plane(end) => end.normal().dot(&axis).abs() <= END_NORMAL,
-            Primitive::Cone(_) => false,
+            Primitive::Cone(_) | Primitive::Sphere(_) => false,
         };
         Self {
             evidence,

@@ -61,7 +61,7 @@ fn axes(parted: &SegmentedMesh) -> Vec<Vector3<f64>> {
         let axis = match &segment.primitive {
             Primitive::Plane(plane) => plane.normal(),
             Primitive::Cylinder(cylinder) => cylinder.axis(),
-            Primitive::Cone(_) => continue,
+            Primitive::Cone(_) | Primitive::Sphere(_) => continue,
         };
         let same = area
             .iter_mut()

@@ -295,7 +295,7 @@ impl Void<'_> {
                 };
                 Some((distance, end))
             }
-            Primitive::Cone(_) => None,
+            Primitive::Cone(_) | Primitive::Sphere(_) => None,
         }
     }
 
