@@ -85,7 +85,7 @@ pub(super) struct ProbeArguments {
     /// Writes mesh and features despite sure findings in the arm's data (`touchup doctor`)
     #[arg(long, conflicts_with = "dry_run")]
     force: bool,
-    /// Folder for plan.png, probing.json, probed_touches.jsonl, recording, probed.json,
+    /// Folder for plan.png, probing.json, probed_touches.jsonl, known_surfaces.jsonl, recording, probed.json,
     /// refined.ply, features.json, touches.csv, touches.png
     #[arg(long, value_name = "DIR")]
     out: PathBuf,

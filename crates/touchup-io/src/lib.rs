@@ -5,7 +5,7 @@
 //! |---|---|
 //! | [`mesh_file`] | meshes and point clouds: PLY, STL, OBJ, PCD, XYZ, E57 |
 //! | [`step_file`] | boundary representations: STEP |
-//! | [`recording`] | recordings of poses and wrenches: MCAP, rosbag2, ROS 1 bags, tables |
+//! | [`recording`] | recordings of poses and wrenches: MCAP, rosbag2, ROS 1 bags, tables; surfaces known of their touches |
 //! | [`tables`] | tables of text: picked points, static poses |
 //! | [`features_file`], [`touches_file`], [`probed_touches_file`], [`result_table`] | measured features and touches |
 //! | [`nominal_file`], [`inspection_file`], [`qif_file`] | drawings, and inspections against them |

@@ -172,6 +172,11 @@ impl TouchLog {
         &self.path
     }
 
+    /// Radius of the tip, m.
+    pub fn ball_radius(&self) -> f64 {
+        self.ball_radius
+    }
+
     /// Number of touches in it.
     pub fn count(&self) -> usize {
         self.counts.values().sum()
@@ -197,7 +202,7 @@ fn touches_of(lines: &[u8]) -> io::Result<Vec<TouchLine>> {
 }
 
 /// The text without an incomplete last line.
-fn whole_lines(text: &[u8]) -> &[u8] {
+pub(crate) fn whole_lines(text: &[u8]) -> &[u8] {
     let end = text
         .iter()
         .rposition(|byte| *byte == b'\n')

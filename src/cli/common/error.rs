@@ -398,6 +398,7 @@ impl From<ReplayError> for CliError {
         match error {
             ReplayError::Markers(what) => Self::usage(what),
             ReplayError::Read(error) => error.into(),
+            ReplayError::Known(error) => Self::new(("recording", 3), &error, Some(&error)),
             ReplayError::Setting(error) => error.into(),
         }
     }

@@ -2,11 +2,14 @@
 //!
 //! A written touch always has all its samples written, however the program ends.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::cli::{CliError, not_written};
 use touchup_io::probed_touches_file::TouchLog;
 use touchup_io::recording::{SegmentedWriter, Topics};
+use touchup_io::recording::{append_known_surfaces, known_surfaces_beside};
+use touchup_io::text_file::write_text;
+use touchup_method::reconstruct::KnownSurface;
 use touchup_method::stylus::Message;
 use touchup_probing::arm::ArmState;
 use touchup_probing::execute::ProbedTouch;
@@ -36,6 +39,8 @@ pub(super) fn probe_topics() -> Topics {
 /// Open files of a probing.
 pub(super) struct ProbeFiles {
     touches: TouchLog,
+    /// Path of the known surfaces.
+    known: PathBuf,
     recording: SegmentedWriter,
     /// Offset from the arm's clock to the recording's, ns; `None` before the first state.
     offset_ns: Option<i64>,
@@ -54,8 +59,11 @@ impl ProbeFiles {
             .map_err(CliError::not_written)?;
         let path = out.join(TOUCHES);
         let touches = TouchLog::create(&path, ball_radius).map_err(not_written(&path))?;
+        let known = known_surfaces_beside(&out.join(RECORDING));
+        write_text(&known, "").map_err(CliError::not_written)?;
         Ok(Self {
             touches,
+            known,
             recording,
             offset_ns: None,
             last_ns: None,
@@ -86,6 +94,7 @@ impl ProbeFiles {
         let touches = TouchLog::resume(&path, ball_radius).map_err(not_written(&path))?;
         Ok(Self {
             touches,
+            known: known_surfaces_beside(&out.join(RECORDING)),
             recording,
             offset_ns: None,
             last_ns,
@@ -127,6 +136,12 @@ impl ProbeFiles {
             .touches
             .append(flag, touch, self.offset_ns.unwrap_or(0));
         written.map_err(not_written(self.touches.path()))
+    }
+
+    /// Writes the surfaces of a feature; returns them as a reader of the file has them.
+    pub fn know(&mut self, surfaces: &[KnownSurface]) -> Result<Vec<KnownSurface>, CliError> {
+        let radius = self.touches.ball_radius();
+        append_known_surfaces(&self.known, surfaces, radius).map_err(not_written(&self.known))
     }
 
     /// Ends the recording; returns the number of written touches.

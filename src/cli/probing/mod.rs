@@ -151,6 +151,7 @@ impl Probing<'_> {
                 continue;
             }
             let one = run.probe(&ready.params, flag, arm, world);
+            world.know(&one.known_surfaces)?;
             file.features.push(ProbedRecord::of(&one, flag));
             file.features.sort_by_key(|record| record.flag);
             // on disk at once, whatever comes after it

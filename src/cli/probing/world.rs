@@ -16,6 +16,7 @@ use touchup_features::calibrate::StaticPose;
 use touchup_geometry::mesh::{FaceHit, FaceTree, TriMesh};
 use touchup_io::probed_touches_file::{TouchLine, TouchLog};
 use touchup_io::tables::static_poses::{StaticPoseLog, static_pose_line};
+use touchup_method::reconstruct::KnownSurface;
 use touchup_method::stylus::{Message, Sample, StampedPose, WrenchFrame};
 use touchup_probing::arm::{ArmState, Observer, StopRequest};
 use touchup_probing::execute::{ProbedTouch, Progress, StaticWorld, World};
@@ -146,6 +147,15 @@ impl<'a> LiveWorld<'a> {
             signals,
             bar: Bar::new("probe", None),
         })
+    }
+
+    /// Writes the surfaces of a feature, and takes them for known.
+    pub fn know(&mut self, surfaces: &[KnownSurface]) -> Result<(), CliError> {
+        let ProbingRecorder { mesh, files, .. } = self.followed.get_mut();
+        for known in files.know(surfaces)? {
+            mesh.refinement.know(known)?;
+        }
+        Ok(())
     }
 
     /// Ends the recording; returns the number of written touches.

@@ -10,14 +10,17 @@ pub const MAY_USE: &[(&str, &str)] = &[
     ("parameters", ""),
     ("stylus", "numeric parameters"),
     ("mesh", "numeric"),
-    ("reconstruct", "numeric parameters stylus mesh"),
+    ("reconstruct", "numeric parameters stylus mesh brep"),
     ("haptic", "numeric parameters stylus mesh reconstruct"),
     ("live", "clock stylus mesh reconstruct haptic threads"),
-    ("plan", "numeric parameters stylus mesh features conformity"),
+    (
+        "plan",
+        "numeric parameters stylus mesh brep reconstruct features conformity",
+    ),
     ("arm", "numeric parameters stylus plan"),
     (
         "execute",
-        "numeric parameters stylus mesh features calibrate plan arm",
+        "numeric parameters stylus mesh reconstruct features calibrate plan arm",
     ),
     ("sim", "numeric stylus mesh features calibrate diagnose arm"),
     ("form", "numeric"),
@@ -30,7 +33,7 @@ pub const MAY_USE: &[(&str, &str)] = &[
     ("diagnose", "numeric stylus mesh"),
     (
         "io",
-        "numeric parameters stylus mesh form brep features conformity align arm execute",
+        "numeric parameters stylus mesh form brep reconstruct features conformity align arm execute",
     ),
     ("scan", "mesh reconstruct io threads"),
     (
@@ -38,7 +41,7 @@ pub const MAY_USE: &[(&str, &str)] = &[
         "parameters stylus mesh reconstruct haptic diagnose plan arm execute sim io",
     ),
     ("probing_run", "plan arm execute"),
-    ("replay", "numeric stylus io scene"),
+    ("replay", "numeric stylus reconstruct io scene"),
     (
         "session",
         "clock numeric stylus mesh brep reconstruct haptic live features io threads scan replay",
@@ -76,7 +79,7 @@ pub const MAY_USE: &[(&str, &str)] = &[
     ),
     (
         "node",
-        "clock stylus mesh reconstruct haptic live form features plan arm execute sim diagnose io scan scene session probing_run refinement \
+        "clock stylus mesh reconstruct haptic live form features plan arm execute sim diagnose io scan scene session probing_run replay refinement \
          threads ros",
     ),
     (

@@ -4,5 +4,6 @@ mod arm;
 mod decided;
 mod execute;
 mod grid;
+mod known_surfaces;
 mod plan;
 mod pockets;

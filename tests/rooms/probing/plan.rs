@@ -73,6 +73,17 @@ fn explored(
     distance: &dyn Fn(&Point3<f64>) -> f64,
     rng: &mut Pcg64,
 ) -> Result<ExplorationResult, ExploreError> {
+    touched(kind, flag, scan, distance, rng).found()
+}
+
+/// As [`explored`]; the explorer after its last touch.
+pub(super) fn touched(
+    kind: FeatureKind,
+    flag: Point3<f64>,
+    scan: &TriMesh,
+    distance: &dyn Fn(&Point3<f64>) -> f64,
+    rng: &mut Pcg64,
+) -> Explorer {
     let params = PatternParams {
         sigma: 10e-6,
         touch_sigma: 5e-6,
@@ -90,7 +101,7 @@ fn explored(
             noise * SIGMA,
         ));
     }
-    explorer.found()
+    explorer
 }
 
 /// Top of the plate of the demo, m.

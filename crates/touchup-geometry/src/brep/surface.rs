@@ -91,7 +91,7 @@ impl AnalyticSurface {
     }
 
     /// Whether the placement is one and each size is in its range.
-    pub(super) fn is_sound(&self) -> bool {
+    pub fn is_sound(&self) -> bool {
         let is_length = |x: f64| x > 0.0 && x.is_finite();
         let is_shape = match self.shape {
             SurfaceShape::Plane => true,

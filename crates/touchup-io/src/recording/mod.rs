@@ -16,6 +16,7 @@ mod db3;
 mod error;
 mod folder;
 mod intake;
+mod known_surfaces_file;
 mod layout;
 mod mcap_files;
 mod messages;
@@ -32,6 +33,10 @@ pub use crate::file_error::FilePlace;
 pub use copy::{CopiedRecording, copy_recording};
 pub use error::{BadCount, BadMessage, Damage, RecordingError};
 pub(crate) use folder::{is_of_recording, own_files};
+pub use known_surfaces_file::{
+    KnownSurfaceLine, append_known_surfaces, bad_surface_line, known_surfaces_beside,
+    read_known_surfaces,
+};
 pub use layout::{RecordingLayout, Topics, TransformFrames};
 pub use mcap_files::writer::{RecordingWriter, write_recording};
 pub use messages::live_message::{LiveSeed, LiveType, SampleKind};

@@ -2,7 +2,8 @@
 //!
 //! [`TouchFinder`] makes touches of samples; [`ContactMap`] and `FreeSpace` keep contacts and free
 //! space. `Evidence` combines these and the scan at a point; the nodes of a regular [`Lattice`]
-//! store the field, with a harmonic fill between the evidence. [`Patcher`] runs the whole pipeline:
+//! store the field, with a harmonic fill between the evidence. Where analytic surfaces are known to
+//! explain the touches ([`KnownSurface`]), the field is theirs. [`Patcher`] runs the whole pipeline:
 //! everything at once, or the changes since the last time, as a [`PatchDelta`] for a mesh that
 //! follows by [`Splice`].
 //!
@@ -26,6 +27,7 @@ mod field;
 mod history;
 mod incremental;
 mod lattice;
+mod model;
 mod support;
 mod table;
 
@@ -48,4 +50,5 @@ pub use incremental::splice::Splice;
 pub use lattice::{
     Edge, Lattice, LatticeNode, LatticeRegion, NodeValues, Owner, PatchFace, Square, VertexKey,
 };
+pub use model::{KnownSurface, KnownSurfaceError, KnownSurfaces};
 pub use support::Support;

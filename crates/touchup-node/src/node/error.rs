@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use touchup_io::json_lines::JsonLineError;
 use touchup_method::haptic::RefineError;
 use touchup_method::stylus::SettingError;
 use touchup_session::live::LiveError;
@@ -69,6 +70,9 @@ pub enum NodeError {
         /// cause
         reason: String,
     },
+    /// The known surfaces of a replayed session are unreadable.
+    #[error(transparent)]
+    Known(#[from] JsonLineError),
     /// The system gives no thread.
     #[error("no thread for the node: {0}; end other programs")]
     NoThread(#[from] std::io::Error),

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use touchup_io::recording::Topics;
+use touchup_session::replay::RecordedSurfaces;
 use touchup_session::session::{
     RecordingLoss, SessionRecorder, StrokeChange, StrokeChanges, StrokeHistory,
 };
@@ -43,6 +44,7 @@ impl Keeping {
 pub struct ReplayedSession {
     recording: PathBuf,
     topics: Topics,
+    known: RecordedSurfaces,
     history: StrokeHistory,
     run: u32,
     seen_ns: Option<i64>,
@@ -52,11 +54,18 @@ impl ReplayedSession {
     /// Before its first message.
     ///
     /// - `recording`, `topics`: its messages, to recompute the touches without a removed one.
+    /// - `known`: surfaces beside it.
     /// - `changes`: recorded stroke changes.
-    pub fn new(recording: PathBuf, topics: Topics, changes: StrokeChanges) -> Self {
+    pub fn new(
+        recording: PathBuf,
+        topics: Topics,
+        known: RecordedSurfaces,
+        changes: StrokeChanges,
+    ) -> Self {
         Self {
             recording,
             topics,
+            known,
             history: changes.history(),
             run: 1,
             seen_ns: None,
@@ -82,6 +91,11 @@ impl ReplayedSession {
     /// Its messages, in the form for [`EvidenceSource`](touchup_session::session::EvidenceSource).
     pub fn recording(&self) -> (&Path, &Topics) {
         (&self.recording, &self.topics)
+    }
+
+    /// Its known surfaces.
+    pub fn known(&self) -> &RecordedSurfaces {
+        &self.known
     }
 
     /// The stroke changes returned up to now.
@@ -133,7 +147,9 @@ mod tests {
             StrokeChange::Undo(exchange(70, 60)),
         ];
         let all = changes.into_iter().collect();
-        let mut session = ReplayedSession::new(PathBuf::from("recording"), Topics::default(), all);
+        let known = RecordedSurfaces::default();
+        let recording = PathBuf::from("recording");
+        let mut session = ReplayedSession::new(recording, Topics::default(), known, all);
         for run in 1..=2 {
             assert_eq!(session.run(), run);
             assert_eq!(session.next_change_at_end(), None, "nothing has come");

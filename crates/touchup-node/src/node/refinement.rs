@@ -184,6 +184,7 @@ impl RefinementWorker {
             }
             self.tick();
         }
+        self.know_probed();
         // the arm stops, retracts and ends while the session is written; later calls are refused
         self.arm = None;
         drop(inbox);
@@ -449,6 +450,7 @@ impl RefinementWorker {
                     Err(error) => self.fail(&error),
                 }
             }
+            self.know_probed();
             self.go_on_taking_out();
             self.send_edits();
             self.go_on_with_uncertainty(now);
@@ -469,6 +471,18 @@ impl RefinementWorker {
                 self.session.counters.accepted,
             );
             self.publish_diagnostics();
+        }
+    }
+
+    /// Takes the surfaces of probed features for known, if they are of this session.
+    fn know_probed(&mut self) {
+        let known: Vec<_> = self.arm.iter().flat_map(ArmHandle::known).collect();
+        for (folder, known) in known {
+            if folder == self.session.folder.path()
+                && let Err(error) = self.session.engine.know(known)
+            {
+                warn!(%error, "the mesh does not follow a surface of a probed feature");
+            }
         }
     }
 

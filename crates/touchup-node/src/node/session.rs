@@ -204,7 +204,7 @@ impl NodeSession {
         keeping: Keeping,
     ) -> Result<Self, NodeError> {
         let axes = WrenchFrame::default();
-        let engine = engine_of(setup, axes)?;
+        let engine = engine_of(setup, axes, &keeping)?;
         Ok(Self {
             name,
             folder,
@@ -239,7 +239,7 @@ impl NodeSession {
     /// # Errors
     /// [`NodeError`]
     pub fn turn_axes(&mut self, setup: &Setup, axes: WrenchFrame) -> Result<(), NodeError> {
-        self.engine = engine_of(setup, axes)?;
+        self.engine = engine_of(setup, axes, &self.keeping)?;
         self.input = InputMonitor::new(setup.input.scene.input_monitor_params(axes))?;
         self.axes = axes;
         Ok(())
@@ -343,11 +343,16 @@ impl NodeSession {
 /// one. No touches yet.
 ///
 /// - `axes`: of the wrenches.
-fn engine_of(setup: &Setup, axes: WrenchFrame) -> Result<Engine, NodeError> {
+fn engine_of(setup: &Setup, axes: WrenchFrame, keeping: &Keeping) -> Result<Engine, NodeError> {
     let beside = (Pace::default(), Gate::open(&setup.clock));
     let mut engine = setup.input.engine(axes, Some(beside)).map_err(Box::new)?;
     engine.watch();
     engine.keep_strokes();
+    if let Keeping::Replayed(replayed) = keeping {
+        let radius = setup.input.scene.tip_params().radius;
+        let know = |known| engine.know(known);
+        replayed.known().of_tip(radius, know)?;
+    }
     // the first renewal needs the bounds of the scan, some ms on a large one: no sample should wait
     // for them
     engine.catch_up()?;

@@ -7,6 +7,7 @@ use nalgebra::Point3;
 use super::links::LinkError;
 use crate::arm::{LimitError, ProbeError, SlideRecord, StopRequest, TouchRecord};
 use crate::plan::{DecidedCharacteristic, ExplorationResult, ExploreError, Slide, TouchPlan};
+use touchup_method::reconstruct::KnownSurface;
 
 /// How a probing ended; as an error, why it ended early.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -165,6 +166,8 @@ pub struct FlagResult {
     pub ending: Ending,
     /// the feature, also after an early ending
     pub found: Option<ExplorationResult>,
+    /// the surfaces of the feature
+    pub known_surfaces: Vec<KnownSurface>,
     /// all touches, in order
     pub touches: Vec<ProbedTouch>,
     /// slides after the touches

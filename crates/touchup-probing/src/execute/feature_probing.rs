@@ -11,7 +11,7 @@ use crate::arm::{
     ArmState, OnsetVerdict, ProbeError, StopRequest, TouchOutcome, TouchRecord, TouchTarget,
     UNEXPECTED,
 };
-use crate::plan::{Explorer, TouchPlan, TouchResult};
+use crate::plan::{ExplorationResult, ExploreError, Explorer, TouchPlan, TouchResult};
 
 /// A feature during its probing: the position of the ball, its path back into free air, and its
 /// touches.
@@ -69,6 +69,7 @@ impl<'a> Prober<'a> {
                     flag: flag.id,
                     ending,
                     found,
+                    known_surfaces: Vec::new(),
                     touches,
                     slides,
                     references,
@@ -91,25 +92,16 @@ impl<'a> Prober<'a> {
         }
         let ended = probing.finish(ended);
         let found = explorer.found();
-        let ending = match (ended, &found) {
-            (Err(ending), _) => ending,
-            (Ok(()), Ok(found)) if !found.characteristics.is_empty() => {
-                Ending::of_decisions(&found.characteristics)
-            }
-            (Ok(()), Ok(found)) if found.is_as_asked => Ending::ToleranceReached,
-            (Ok(()), Ok(found)) => {
-                found
-                    .limited
-                    .map_or(Ending::TouchesSpent, |over| Ending::CalibrationLimits {
-                        over,
-                    })
-            }
-            (Ok(()), Err(error)) => Ending::NothingFound(error.clone()),
-        };
+        let ending = ending_of(ended, &found);
+        // it is unknown which of its touches hold
+        let found = found.ok().filter(|_| !ending.is_displaced());
         FlagResult {
             flag: flag.id,
-            // it is unknown which of its touches hold
-            found: found.ok().filter(|_| !ending.is_displaced()),
+            known_surfaces: found
+                .iter()
+                .flat_map(|_| explorer.known_surfaces())
+                .collect(),
+            found,
             ending,
             seconds: probing.seconds(),
             peak_force: probing.peak_force,
@@ -520,6 +512,25 @@ impl FeatureProbing<'_, '_> {
             self.is_out = self.from.take().is_none() && self.entry.take().is_none();
         }
         Ok(())
+    }
+}
+
+/// Ending of an exploration, from its touches and its result.
+fn ending_of(ended: Result<(), Ending>, found: &Result<ExplorationResult, ExploreError>) -> Ending {
+    match (ended, found) {
+        (Err(ending), _) => ending,
+        (Ok(()), Ok(found)) if !found.characteristics.is_empty() => {
+            Ending::of_decisions(&found.characteristics)
+        }
+        (Ok(()), Ok(found)) if found.is_as_asked => Ending::ToleranceReached,
+        (Ok(()), Ok(found)) => {
+            found
+                .limited
+                .map_or(Ending::TouchesSpent, |over| Ending::CalibrationLimits {
+                    over,
+                })
+        }
+        (Ok(()), Err(error)) => Ending::NothingFound(error.clone()),
     }
 }
 

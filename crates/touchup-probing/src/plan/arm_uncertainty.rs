@@ -55,6 +55,11 @@ impl ArmUncertainty {
         Matrix3::identity() * along_each + (square - lever * lever.transpose()) * self.turn.powi(2)
     }
 
+    /// Standard uncertainty of a surface along its unit normal, m.
+    pub(super) fn along(&self, place: &Point3<f64>, normal: &Vector3<f64>) -> f64 {
+        along(&self.shift(place), normal).hypot(self.radius)
+    }
+
     /// Standard uncertainty of a feature's place in its most uncertain direction, m.
     ///
     /// - `out`: of the surface, unit vector.

@@ -23,6 +23,7 @@ use touchup_features::features::fit::Observation;
 use touchup_features::features::{Feature, FeatureKind};
 use touchup_geometry::mesh::TriMesh;
 use touchup_geometry::numeric::turned_to;
+use touchup_method::reconstruct::KnownSurface;
 
 /// Result of an exploration.
 #[derive(Clone, Debug, PartialEq)]
@@ -290,6 +291,11 @@ impl Explorer {
                 observation,
             },
         );
+    }
+
+    /// The surfaces that the touches fit; none without a feature.
+    pub fn known_surfaces(&self) -> Vec<KnownSurface> {
+        self.stage.known_surfaces(&self.context).unwrap_or_default()
     }
 
     /// Result, once [`Self::next_touch`] plans nothing more.

@@ -11,6 +11,7 @@ mod design;
 mod error;
 mod explorer;
 mod kinds;
+mod known_surfaces;
 mod level;
 mod measuring;
 mod outline;

@@ -10,6 +10,7 @@ use super::search_context::{SearchContext, TouchPlan, TouchResult};
 use super::slide::Slide;
 use touchup_features::features::Feature;
 use touchup_features::features::fit::Observation;
+use touchup_method::reconstruct::KnownSurface;
 
 /// A touch and its result, as a stage takes them.
 pub(super) struct PatternStep {
@@ -36,6 +37,11 @@ pub(super) trait TouchPattern: Debug + Send {
     /// # Errors
     /// [`ExploreError`]; [`ExploreError::NotDone`] before that is possible.
     fn feature(&self, context: &SearchContext) -> Result<Option<Feature>, ExploreError>;
+    /// The surfaces that the touches made fit.
+    ///
+    /// # Errors
+    /// As [`Self::feature`].
+    fn known_surfaces(&self, context: &SearchContext) -> Result<Vec<KnownSurface>, ExploreError>;
     /// Present standard uncertainty of the number, m or rad.
     fn uncertainty(&self, context: &SearchContext) -> Option<f64>;
     /// Whether the number has the requested uncertainty.

@@ -1,6 +1,7 @@
 //! Errors of the engine.
 
 use touchup_method::haptic::RefineError;
+use touchup_method::reconstruct::KnownSurfaceError;
 use touchup_method::stylus::SettingError;
 
 /// Error of the engine.
@@ -12,6 +13,9 @@ pub enum LiveError {
     /// A setting outside its range.
     #[error(transparent)]
     Setting(#[from] SettingError),
+    /// A known surface that is none.
+    #[error(transparent)]
+    Known(#[from] KnownSurfaceError),
     /// The system provides no thread.
     #[error("no thread for the patch: {0}; end other programs, or leave `patch` out of the scene")]
     NoThread(String),

@@ -1,6 +1,6 @@
 //! Evidence of samples without a mesh; rebuilding it can leave out samples.
 
-use touchup_method::reconstruct::{Patcher, PatcherParams};
+use touchup_method::reconstruct::{KnownSurface, KnownSurfaceError, Patcher, PatcherParams};
 use touchup_method::stylus::{ContactEstimator, ContactSample, Sample, SampleError, SettingError};
 
 /// Takes samples like an [`super::Engine`], without moving a mesh.
@@ -35,6 +35,14 @@ impl EvidenceReplay {
         let contact = self.contacts.observe(sample)?;
         self.patcher.push(contact);
         Ok(contact)
+    }
+
+    /// Takes a surface for known, as [`Patcher::know`].
+    ///
+    /// # Errors
+    /// [`KnownSurfaceError`]
+    pub fn know(&mut self, known: KnownSurface) -> Result<(), KnownSurfaceError> {
+        self.patcher.know(known)
     }
 
     /// Undoes the last stroke; returns its touch-down, ns, or `None` without a stroke.

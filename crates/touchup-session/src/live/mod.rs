@@ -34,7 +34,7 @@ use renewals::Renewals;
 pub use renewals::{LiveCounts, Pace};
 use touchup_geometry::mesh::{Changes, FaceId, FaceTree, TriMesh, VertexId};
 use touchup_method::haptic::{Footprint, RefineCounts, RefineError, RefineParams, Refiner, Update};
-use touchup_method::reconstruct::{Patcher, PatcherParams, Support};
+use touchup_method::reconstruct::{KnownSurface, Patcher, PatcherParams, Support};
 use touchup_method::stylus::{BiasParams, ContactSample, Sample};
 use worker::PatchedScans;
 
@@ -287,6 +287,18 @@ impl Engine {
             renewals.catch_up(&mut self.refiner)
         } else {
             Ok(())
+        }
+    }
+
+    /// Takes a surface for known, as [`Patcher::know`]; without a patch it does nothing.
+    ///
+    /// # Errors
+    /// [`LiveError::Known`], [`LiveError::Stopped`].
+    pub fn know(&mut self, known: KnownSurface) -> Result<(), LiveError> {
+        match &mut self.patch {
+            Reconstruction::Without => Ok(()),
+            Reconstruction::AtEnd(patcher) => Ok(patcher.know(known)?),
+            Reconstruction::Beside(renewals) => renewals.know(known),
         }
     }
 

@@ -9,7 +9,7 @@ use super::gate::Gate;
 use super::probed::TouchDelta;
 use super::worker::{PatchedScans, Question, Worker, WorkerAnswer};
 use touchup_method::haptic::Refiner;
-use touchup_method::reconstruct::{PatchDelta, Patcher};
+use touchup_method::reconstruct::{KnownSurface, KnownSurfaces, PatchDelta, Patcher};
 use touchup_method::stylus::{ContactSample, SettingError};
 
 /// Parts of a change of the patch per sample: some 100 µs on a mesh of a million faces.
@@ -100,6 +100,8 @@ impl Rest {
 #[derive(Debug)]
 pub(super) struct Renewals {
     worker: Worker,
+    /// those of the patcher
+    known: KnownSurfaces,
     pace: Pace,
     /// samples since the last renewal
     batch: Vec<ContactSample>,
@@ -139,6 +141,7 @@ impl Renewals {
     ) -> Result<Self, LiveError> {
         pace.check()?;
         Ok(Self {
+            known: patcher.known().clone(),
             worker: Worker::new(scans, patcher, gate)?,
             pace,
             batch: Vec::new(),
@@ -273,6 +276,15 @@ impl Renewals {
         self.worker.ask(Question::ChangeStrokes(change))?;
         self.due_ns.push_back(i64::MAX);
         self.take_up_all(refiner)
+    }
+
+    /// As [`super::Engine::know`].
+    pub fn know(&mut self, known: KnownSurface) -> Result<(), LiveError> {
+        self.known.add(known.clone())?;
+        self.is_settled = false;
+        self.worker.ask(Question::Know(known))?;
+        self.due_ns.push_back(i64::MIN);
+        Ok(())
     }
 
     /// Continues with another patcher, which has all samples; as [`super::Engine::end_replay`].

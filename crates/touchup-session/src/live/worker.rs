@@ -11,13 +11,15 @@ use super::probed::{PublishedList, TouchDelta};
 use crate::clock::WorkGuard;
 use crate::threads::give_way;
 use touchup_geometry::mesh::{FaceTree, TriMesh};
-use touchup_method::reconstruct::{PatchDelta, Patcher};
+use touchup_method::reconstruct::{KnownSurface, PatchDelta, Patcher};
 use touchup_method::stylus::ContactSample;
 
 /// Requests to the thread.
 pub(super) enum Question {
     /// take in these samples, and answer the changes
     Renew(Vec<ContactSample>),
+    /// take a surface for known, and answer the changes
+    Know(KnownSurface),
     /// take in the samples of the smoothing window, and answer the changes
     Flush,
     /// answer the changes of a reconstruction of all touches at once, with the samples of the
@@ -124,6 +126,8 @@ impl PatchLoop {
                 let _ = to.send(copy);
                 return None;
             }
+            // valid, as the engine has taken it
+            Question::Know(known) => _ = patcher.know(known),
             Question::Flush => patcher.flush(),
             Question::Settle => {}
             Question::ChangeStrokes(change) => changed_stroke_ns = change(patcher),

@@ -26,7 +26,7 @@ use touchup_io::mesh_file::MeshUnit;
 use touchup_method::haptic::{
     Footprint, RefineCounts, RefineError, RefineParams, ScanRegion, Update,
 };
-use touchup_method::reconstruct::CloudSummary;
+use touchup_method::reconstruct::{CloudSummary, KnownSurface};
 use touchup_method::stylus::{
     ContactSample, FrictionCoefficient, MarkerFilter, Message, Sample, SettingError, WrenchFrame,
 };
@@ -397,6 +397,9 @@ impl Refinement {
     ) -> Result<(), ReplayError> {
         let scene = &self.input.scene;
         let (placement, sync) = (scene.placement(), scene.sync_params());
+        let radius = scene.tip_params().radius;
+        let know = |known| self.stage.know(known);
+        recording.known.of_tip(radius, know)?;
         let this = RefCell::new(self);
         let mut at_message = |message: &Message| this.borrow_mut().watch.monitor.message(message);
         let replayed = each_sample(
@@ -410,6 +413,14 @@ impl Refinement {
         )?;
         this.into_inner().replayed = replayed;
         Ok(())
+    }
+
+    /// Takes a surface for known, as [`Engine::know`].
+    ///
+    /// # Errors
+    /// Those of [`Engine::know`].
+    pub fn know(&mut self, known: KnownSurface) -> Result<(), LiveError> {
+        self.stage.know(known)
     }
 
     /// Takes a sample of a recording when due, unless the options exclude its stroke.
@@ -578,6 +589,13 @@ impl SampleConsumer {
                 counts.contacts = evidence.contacts().contacts();
                 Ok(None)
             }
+        }
+    }
+
+    fn know(&mut self, known: KnownSurface) -> Result<(), LiveError> {
+        match self {
+            Self::Moving(engine) => engine.know(known),
+            Self::Keeping { evidence, .. } => Ok(evidence.know(known)?),
         }
     }
 

@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, VecDeque};
 use std::path::Path;
 
 use touchup_geometry::numeric::counted;
+use touchup_io::json_lines::JsonLineError;
 use touchup_io::recording::{
     Record, RecordingError, RecordingLayout, RecordingReader, StampSource,
 };
@@ -15,8 +16,10 @@ use touchup_method::stylus::{
 use crate::scene::Scene;
 
 mod recorded_as;
+mod recorded_surfaces;
 
 pub use recorded_as::RecordedAs;
+pub use recorded_surfaces::RecordedSurfaces;
 
 /// Error of a replay.
 #[derive(Debug, thiserror::Error)]
@@ -27,6 +30,9 @@ pub enum ReplayError {
     /// The recording is damaged before its first message.
     #[error(transparent)]
     Read(#[from] RecordingError),
+    /// The known surfaces beside the recording.
+    #[error(transparent)]
+    Known(#[from] JsonLineError),
     /// A parameter of the pairing or of the placement outside its range.
     #[error(transparent)]
     Setting(#[from] SettingError),
@@ -59,6 +65,8 @@ pub struct Recording {
     ahead: VecDeque<Result<Record, RecordingError>>,
     /// Axes of the wrenches: O if their header names the frame of the pose, else the stylus' own.
     pub wrench_frame: WrenchFrame,
+    /// Known surfaces beside the recording.
+    pub known: RecordedSurfaces,
 }
 
 impl Recording {
@@ -90,6 +98,7 @@ impl Recording {
             reader: Some(reader),
             ahead,
             wrench_frame,
+            known: RecordedSurfaces::default(),
         })
     }
 
@@ -108,6 +117,7 @@ impl Recording {
             reader: None,
             ahead: ahead.collect(),
             wrench_frame,
+            known: RecordedSurfaces::default(),
         }
     }
 

@@ -5,7 +5,7 @@ use std::path::Path;
 use clap::Args;
 use serde::{Deserialize, Serialize, Serializer};
 
-use super::{Recording, ReplayError, marker_filter};
+use super::{RecordedSurfaces, Recording, ReplayError, marker_filter};
 use crate::scene::Scene;
 use touchup_io::recording::{RecordingLayout, StampSource, Topics, TransformFrames};
 use touchup_method::stylus::MarkerFilter;
@@ -96,10 +96,11 @@ impl RecordedAs {
         }
     }
 
-    /// Opens a recording, and the filter that computes the poses of its markers.
+    /// Opens a recording with the known surfaces beside it, and the filter that computes the poses
+    /// of its markers.
     ///
     /// # Errors
-    /// [`ReplayError::Markers`], [`ReplayError::Read`].
+    /// [`ReplayError::Markers`], [`ReplayError::Read`], [`ReplayError::Known`].
     pub fn open(
         &self,
         path: &Path,
@@ -107,7 +108,9 @@ impl RecordedAs {
         stamps: StampSource,
     ) -> Result<(Recording, Option<MarkerFilter>), ReplayError> {
         let markers = marker_filter(scene, self.markers_topic.as_deref())?;
-        Ok((Recording::open(path, self.layout(scene), stamps)?, markers))
+        let mut recording = Recording::open(path, self.layout(scene), stamps)?;
+        recording.known = RecordedSurfaces::beside(path)?;
+        Ok((recording, markers))
     }
 
     /// Which time of a message counts.

@@ -23,7 +23,6 @@ use touchup_method::stylus::Message;
 const DESCRIPTION: &str = "session.json";
 const SCENE: &str = "scene.yaml";
 const STROKES: &str = "strokes.jsonl";
-const RECORDING: &str = "recording";
 
 /// Longest time between flushes, and maximum loss in a crash.
 const FLUSH_EVERY: Duration = Duration::from_millis(50);
@@ -116,6 +115,9 @@ pub struct SessionRecord {
 }
 
 impl SessionRecord {
+    /// Name of the recording in the folder of a session.
+    pub const RECORDING: &str = "recording";
+
     /// Writes scene, start time and reference of the scan into a new folder.
     ///
     /// # Errors
@@ -172,7 +174,7 @@ impl SessionRecord {
             scan,
             mesh_unit,
             scene: folder.join(SCENE),
-            recording: folder.join(RECORDING),
+            recording: folder.join(SessionRecord::RECORDING),
             topics: Topics {
                 pose: pose_topic,
                 wrench: wrench_topic,
@@ -244,7 +246,7 @@ impl SessionRecorder {
         clock: &Clock,
     ) -> Result<Self, SessionError> {
         let recording = folder
-            .create_folder(RECORDING)
+            .create_folder(SessionRecord::RECORDING)
             .map_err(io_error(folder.path()))?;
         let writer = SegmentedWriter::new(&recording, topics);
         let (sender, messages) = sync_channel(MOST_WAITING);
@@ -286,7 +288,7 @@ impl SessionRecorder {
 
     /// The folder of the messages.
     pub fn recording(&self) -> PathBuf {
-        self.folder.path().join(RECORDING)
+        self.folder.path().join(SessionRecord::RECORDING)
     }
 
     /// A receiver for a signal once all earlier messages are on disk; no signal comes if the disk
@@ -457,8 +459,11 @@ mod tests {
     }
 
     fn on_disk(folder: &SessionFolder) -> Vec<Message> {
-        let reader =
-            RecordingReader::open(&folder.path().join(RECORDING), &Topics::default()).unwrap();
+        let reader = RecordingReader::open(
+            &folder.path().join(SessionRecord::RECORDING),
+            &Topics::default(),
+        )
+        .unwrap();
         reader.map_while(Result::ok).collect()
     }
 
@@ -565,7 +570,7 @@ mod tests {
     fn it_records_on_when_the_disk_takes_again() {
         let ((_parent, folder), (clock, hand)) = (folder(), Clock::manual());
         let recorder = SessionRecorder::start(&folder, &Topics::default(), &clock).unwrap();
-        remove_dir(folder.path().join(RECORDING)).unwrap();
+        remove_dir(folder.path().join(SessionRecord::RECORDING)).unwrap();
         (1..=5).for_each(|number| recorder.write(wrench(number), "tip"));
         hand.advance(FLUSH_EVERY);
         let refused = recorder.unrecorded();
@@ -575,7 +580,7 @@ mod tests {
                 && refused.reason.unwrap().contains("touch_0000.mcap")
         );
 
-        folder.create_folder(RECORDING).unwrap();
+        folder.create_folder(SessionRecord::RECORDING).unwrap();
         // no retry before its time
         recorder.write(wrench(6), "tip");
         hand.advance(ASK_AGAIN - FLUSH_EVERY);
@@ -589,6 +594,12 @@ mod tests {
         recorder.write(wrench(8), "tip");
         assert_eq!(recorder.finish(), accepted);
         assert_eq!(on_disk(&folder), [7, 8].map(wrench));
-        assert!(folder.path().join(RECORDING).join("metadata.yaml").exists());
+        assert!(
+            folder
+                .path()
+                .join(SessionRecord::RECORDING)
+                .join("metadata.yaml")
+                .exists()
+        );
     }
 }

@@ -109,6 +109,7 @@ fn is_written(folder: &Path) {
         "deviation.png",
         "refined.ply",
         "recording",
+        "known_surfaces.jsonl",
         "probed.json",
         "scene.yaml",
     ] {

@@ -196,15 +196,15 @@ fn gradient(grid: &ReconstructionGrid, node: &LatticeNode) -> Vector3<f64> {
 mod tests {
     use super::*;
     use crate::reconstruct::evidence::free_space::FreeSpace;
+    use crate::reconstruct::model::KnownSurfaces;
     use crate::reconstruct::{ContactMap, ContactSigma, EvidenceParams, SurfaceContact};
     use crate::stylus::{TipBody, TipShape};
     use touchup_geometry::mesh::{FaceTree, TriMesh};
 
     const RADIUS: f64 = 1.5e-3;
 
-    #[test]
-    fn just_below_an_edge_the_crossing_is_that_of_the_wall() {
-        // a step: the face z = 0 for y < 0, the wall y = 0 below it
+    /// Contacts of a step: the face z = 0 for y < 0, and the wall y = 0 below it.
+    fn step() -> ContactMap {
         let mut contacts = ContactMap::new(RADIUS / 3.0, 2.0 * RADIUS, None);
         for (i, j) in (-12..=12)
             .flat_map(|i| (1..=16).map(move |j| (f64::from(i) * 0.5e-3, f64::from(j) * 0.5e-3)))
@@ -222,6 +222,12 @@ mod tests {
                 });
             }
         }
+        contacts
+    }
+
+    #[test]
+    fn just_below_an_edge_the_crossing_is_that_of_the_wall() {
+        let contacts = step();
         let scan = TriMesh::new(
             vec![
                 Point3::origin(),
@@ -239,6 +245,7 @@ mod tests {
             params: &params,
             contacts,
             free_space,
+            known: &KnownSurfaces::new(RADIUS),
             scan: &scan,
             tree: &tree,
             prior: None,

@@ -51,10 +51,10 @@ pub(crate) struct FieldValue {
     pub value: f64,
     /// unit gradient
     pub gradient: Vector3<f64>,
-    /// distance to the nearest contact, m
+    /// distance to the nearest contact, or to the extent of a known surface, m
     pub nearest: f64,
-    /// number of the nearest contact
-    pub contact: u32,
+    /// what the value is of
+    pub origin: FieldOrigin,
     /// the nearest contact is on an edge that the ball rolled over
     pub is_fan: bool,
     /// the contacts of the decisive piece do not surround the point: it is beyond the last of them
@@ -63,8 +63,30 @@ pub(crate) struct FieldValue {
     pub is_edge: bool,
 }
 
+/// Origin of a value of the field.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum FieldOrigin {
+    /// contacts; the number of the nearest one
+    Contacts(u32),
+    /// a known surface
+    Known {
+        /// its standard deviation, m
+        sigma: f64,
+        /// distance of the nearest contact along the surface, m
+        from_contact: f64,
+    },
+}
+
 impl FieldValue {
     /// Distance from the nearest contact along the surface, m.
+    pub(crate) fn off_contact(&self) -> f64 {
+        match self.origin {
+            FieldOrigin::Contacts(_) => self.lateral(),
+            FieldOrigin::Known { from_contact, .. } => from_contact,
+        }
+    }
+
+    /// Distance from the nearest contact along the surface, of a known surface from its extent, m.
     pub(crate) fn lateral(&self) -> f64 {
         (self.nearest * self.nearest - self.value * self.value)
             .max(0.0)
@@ -204,7 +226,7 @@ impl FieldParams {
             value,
             gradient,
             nearest: nearest.distance_squared.sqrt(),
-            contact: nearest.index,
+            origin: FieldOrigin::Contacts(nearest.index),
             is_fan: means[nearest.index as usize].is_fan,
             is_border: is_border(arms, &gradient, UNDER * self.sigma, angles),
             is_edge,

@@ -7,8 +7,9 @@ use crate::reconstruct::evidence::contact_map::ContactMap;
 use crate::reconstruct::evidence::contact_uncertainty::UncertaintyParams;
 use crate::reconstruct::evidence::free_space::FreeSpace;
 use crate::reconstruct::evidence::inner_corner::is_inner_corner;
-use crate::reconstruct::evidence::piecewise::{FieldParams, FieldScratch, FieldValue};
+use crate::reconstruct::evidence::piecewise::{FieldOrigin, FieldParams, FieldScratch, FieldValue};
 use crate::reconstruct::evidence::scan_distance::ScanDistance;
+use crate::reconstruct::model::{KnownSurfaces, KnownValue};
 use touchup_geometry::mesh::{FaceTree, TriMesh};
 use touchup_geometry::numeric::direction;
 
@@ -42,6 +43,9 @@ const FAN_SUPPORT: f64 = 0.25;
 /// Maximum distance from its surface at which a contact counts, in radii: behind it may be another
 /// wall.
 const TOUCH_DEPTH: f64 = 0.8;
+/// Distance of a contact from the known surfaces beyond which they do not explain it, in radii, and
+/// [`ENDS_SIGMAS`] of its standard deviations: 0.15 mm for a ball of 1.5 mm.
+const UNEXPLAINED: f64 = 0.1;
 /// Minimum distance of a free ball's centre from any contact, in radii.
 pub(in crate::reconstruct) const FREE_REACH: f64 = 1.5;
 /// Distance from a contact that faces alike within which the scan is rejected, in radii.
@@ -102,8 +106,9 @@ pub(in crate::reconstruct) struct NodeState {
     pub is_further: bool,
     /// value of the field of the touches, m; `None` out of their support
     pub touched_value: Option<f64>,
-    /// whether it is in an inner corner that two touched surfaces extend into
-    pub is_corner: bool,
+    /// whether touched surfaces extend here without a touch near: into an inner corner, or as a
+    /// known surface
+    pub is_extended: bool,
     /// number of the renewal of this value
     pub renewal: u32,
 }
@@ -121,7 +126,7 @@ impl NodeState {
             is_free_end: false,
             is_further: false,
             touched_value: Some(value),
-            is_corner: false,
+            is_extended: false,
             renewal: 0,
         }
     }
@@ -179,6 +184,8 @@ pub(crate) struct Evidence<'a> {
     pub contacts: &'a ContactMap,
     /// the swept volume of the ball
     pub free_space: &'a FreeSpace,
+    /// the known surfaces
+    pub known: &'a KnownSurfaces,
     /// the original scan
     pub scan: &'a TriMesh,
     /// tree over the faces of the scan
@@ -220,6 +227,8 @@ impl Evidence<'_> {
         if let Some(touched) = touched.filter(|_| is_corner) {
             (value, source) = (touched.value, Source::Touch);
         }
+        let is_extended = is_corner
+            || source == Source::Touch && touched.is_some_and(|touched| self.is_afar(&touched));
         let mut straight = touched.and_then(|touched| self.straight_on(&touched, scan));
         if scan.is_on_rim && !matches!(source, Source::Touch | Source::Both) {
             let is_just_beyond = scan.value.abs() < RIM_REACH * pitch;
@@ -255,7 +264,7 @@ impl Evidence<'_> {
             is_free_end: least > 0.0 && is_free_end && scan.value < -self.params.scan_reach,
             is_further: false,
             touched_value: (source == Source::Touch).then_some(value),
-            is_corner,
+            is_extended,
             renewal: 0,
         }
     }
@@ -265,8 +274,9 @@ impl Evidence<'_> {
         ScanDistance::at(self.scan, self.tree, x)
     }
 
-    /// The field of the touches at `x` (m, in O), which replace the scan by the gain σₛ² / (σₛ² +
-    /// σₜ²) of the nearest one; `None` without contacts in reach.
+    /// The field of the touches at `x` (m, in O): of a known surface, or of the contacts, which
+    /// replace the scan by the gain σₛ² / (σₛ² + σₜ²) of the nearest one; `None` without either in
+    /// reach.
     ///
     /// - `scan`: distance of the scan there, if known.
     pub(crate) fn touched(
@@ -275,10 +285,38 @@ impl Evidence<'_> {
         scan: Option<&ScanDistance>,
         scratch: &mut FieldScratch,
     ) -> Option<FieldValue> {
-        let mut found = self.params.field.at(self.contacts, x, scratch)?;
+        let of_contacts = self.params.field.at(self.contacts, x, scratch);
+        if let Some(KnownValue {
+            value,
+            gradient,
+            sigma,
+            beyond,
+        }) = self.known_at(x, of_contacts.as_ref())
+        {
+            let from_contact = of_contacts.map_or(f64::INFINITY, |found| {
+                (found.nearest * found.nearest - value * value)
+                    .max(0.0)
+                    .sqrt()
+            });
+            let mut found = FieldValue {
+                value,
+                gradient,
+                nearest: value.hypot(beyond),
+                origin: FieldOrigin::Known {
+                    sigma,
+                    from_contact,
+                },
+                is_fan: false,
+                is_border: beyond > 0.0,
+                is_edge: false,
+            };
+            self.end_at_free_space(&mut found, x);
+            return Some(found);
+        }
+        let mut found = of_contacts?;
         if let Some(prior) = self.prior
             && found.value.abs() < prior.gate_sigmas * prior.scan
-            && let of_touch = self.contacts.variance(found.contact)
+            && let of_touch = self.variance(&found)
             && prior.gate_sigmas * of_touch.sqrt() > NOTICED * prior.scan
             && let Some(scan) = scan.copied().or_else(|| self.scan_at(x))
         {
@@ -292,6 +330,43 @@ impl Evidence<'_> {
         Some(found)
     }
 
+    /// The field of the known surfaces at `x` (m, in O); `None` also beside a contact that they do
+    /// not explain.
+    ///
+    /// - `of_contacts`: the field of the contacts there.
+    pub(in crate::reconstruct) fn known_at(
+        &self,
+        x: &Point3<f64>,
+        of_contacts: Option<&FieldValue>,
+    ) -> Option<KnownValue> {
+        let known = self.known.at(x)?;
+        let Some(found) = of_contacts else {
+            return Some(known);
+        };
+        // the place of a contact on an edge depends on the direction of its force
+        let is_beside = !found.is_fan && found.lateral() <= BORDER_SUPPORT * self.params.radius;
+        let is_explained = |contact: u32| {
+            let there = self
+                .known
+                .at(&self.contacts.means()[contact as usize].point);
+            let most = UNEXPLAINED * self.params.radius
+                + ENDS_SIGMAS * self.contacts.variance(contact).sqrt();
+            there.is_some_and(|there| there.value.abs() <= most)
+        };
+        match found.origin {
+            FieldOrigin::Contacts(contact) if is_beside && !is_explained(contact) => None,
+            _ => Some(known),
+        }
+    }
+
+    /// Variance of the surface along its normal, m².
+    fn variance(&self, found: &FieldValue) -> f64 {
+        match found.origin {
+            FieldOrigin::Contacts(contact) => self.contacts.variance(contact),
+            FieldOrigin::Known { sigma, .. } => sigma * sigma,
+        }
+    }
+
     /// Ends a touched surface beyond its last contact at the ball: it rolled around an edge there,
     /// or sank into a hole.
     pub(in crate::reconstruct) fn end_at_free_space(
@@ -302,14 +377,13 @@ impl Evidence<'_> {
         let radius = self.params.radius;
         // a tip of another shape reaches along its flank, and its nearest place says little of its
         // surface
-        if found.lateral() < ENDS_FROM * radius || !self.free_space.is_of_ball() {
+        if found.off_contact() < ENDS_FROM * radius || !self.free_space.is_of_ball() {
             return;
         }
         let Some((distance, centre)) = self.free_space.nearest(x) else {
             return;
         };
-        let margin =
-            ENDS_MARGIN * radius + ENDS_SIGMAS * self.contacts.variance(found.contact).sqrt();
+        let margin = ENDS_MARGIN * radius + ENDS_SIGMAS * self.variance(found).sqrt();
         let depth = radius - margin - distance;
         if depth > found.value
             && let Some(outward) = direction(&(centre - x))
@@ -320,17 +394,9 @@ impl Evidence<'_> {
 
     /// The field of the touches if they support the point, else of the scan if it holds.
     fn beside_touches(&self, touched: &FieldValue, scan: &ScanDistance) -> (f64, Source) {
-        let p = self.params;
-        let lateral = touched.lateral();
-        let support = match (touched.is_border, touched.is_fan) {
-            _ if touched.is_edge => EDGE_SUPPORT,
-            (false, _) => INNER_SUPPORT,
-            (true, false) => BORDER_SUPPORT,
-            (true, true) => FAN_SUPPORT,
-        };
-        let is_supported =
-            lateral <= support * p.radius && touched.value.abs() <= TOUCH_DEPTH * p.radius;
-        if is_supported && (!touched.is_border || touched.is_edge) {
+        let is_supported = self.is_supported(touched);
+        let is_known = matches!(touched.origin, FieldOrigin::Known { .. }) && !touched.is_border;
+        if is_known || is_supported && (!touched.is_border || touched.is_edge) {
             return (touched.value, Source::Touch);
         }
         let is_wall = scan.normal.dot(&touched.gradient) < ALIKE;
@@ -351,6 +417,24 @@ impl Evidence<'_> {
         } else {
             (scan.value, Source::Nothing)
         }
+    }
+
+    /// Whether a known surface goes on here away from its contacts.
+    fn is_afar(&self, touched: &FieldValue) -> bool {
+        matches!(touched.origin, FieldOrigin::Known { .. })
+            && touched.off_contact() > BORDER_SUPPORT * self.params.radius
+    }
+
+    /// Whether the contacts near a point support the touched surface there.
+    fn is_supported(&self, touched: &FieldValue) -> bool {
+        let support = match (touched.is_border, touched.is_fan) {
+            _ if touched.is_edge => EDGE_SUPPORT,
+            (false, _) => INNER_SUPPORT,
+            (true, false) => BORDER_SUPPORT,
+            (true, true) => FAN_SUPPORT,
+        };
+        let radius = self.params.radius;
+        touched.lateral() <= support * radius && touched.value.abs() <= TOUCH_DEPTH * radius
     }
 
     /// Whether the scan has the touched shape here, in more detail.
@@ -452,7 +536,9 @@ impl Evidence<'_> {
             return false;
         }
         let (scan_removal, wall_removal) = (SCAN_REMOVAL * p.radius, p.radius / WALL_REMOVAL);
-        let mut holds = true;
+        let mut holds = !self
+            .known
+            .is_beside(&scan.foot, &scan.normal, scan_removal, ALIKE);
         self.contacts
             .near(&scan.foot, scan_removal, |distance_squared, index| {
                 let contact = &self.contacts.means()[index as usize];
@@ -573,6 +659,7 @@ mod tests {
                 params,
                 contacts,
                 free_space,
+                known: &KnownSurfaces::new(radius),
                 scan,
                 tree,
                 prior: None,

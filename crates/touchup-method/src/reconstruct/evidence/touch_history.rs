@@ -11,6 +11,7 @@ use crate::reconstruct::evidence::stroke_log::StrokeLog;
 use crate::reconstruct::evidence::touches::TipTouch;
 use crate::reconstruct::evidence_changes::GridChanges;
 use crate::reconstruct::history::Direction;
+use crate::reconstruct::model::KnownSurfaces;
 use crate::reconstruct::table::CellTable;
 use crate::stylus::{STROKE_PAUSE_NS, TipPlace, TouchState};
 use touchup_geometry::mesh::{FaceTree, TriMesh};
@@ -28,6 +29,11 @@ const OUTSIDE: f64 = 4.0;
 const FAN_WIDTH: f64 = 0.4;
 /// Cosine of the angle between normals, 25°, above which they belong to an edge.
 const FAN_COSINE: f64 = 0.906;
+/// Largest distance of a contact from the mean of its cell, in radii: the diagonal of a cell of a
+/// third of the radius.
+const CELL_DIAGONAL: f64 = 0.578;
+/// Cosine of the maximum angle between a contact and the known surface that explains it.
+const ALIKE: f64 = 0.6;
 /// Range of the search for dependants of a moved mean, in fan widths: a mean moves within its cell.
 const MOVED: f64 = 2.0;
 
@@ -38,6 +44,7 @@ pub(in crate::reconstruct) struct TouchHistory {
     pub free_space: FreeSpace,
     pub probed: ProbedLog,
     pub stroke_log: StrokeLog,
+    pub known: KnownSurfaces,
     /// whether free space counts as evidence; else `free_space` stays empty
     pub keeps_free_space: bool,
     /// size of the tip, m
@@ -139,6 +146,7 @@ impl TouchHistory {
         let Self {
             contacts,
             free_space,
+            known,
             radius,
             ..
         } = self;
@@ -176,13 +184,20 @@ impl TouchHistory {
                 changed.insert(at, ());
             }
         }
-        GridChanges {
-            means: changed
-                .iter()
-                .map(|(at, ())| contacts.means()[at as usize].point)
-                .collect(),
-            centres,
-        }
+        let mut means: Vec<_> = changed
+            .iter()
+            .map(|(at, ())| contacts.means()[at as usize].point)
+            .collect();
+        let beside = CELL_DIAGONAL * *radius;
+        means.extend(known.update(|place, normal| {
+            let mut is_touched = false;
+            contacts.near_known(place, beside, |_, at| {
+                let facing = contacts.means()[at as usize].normal;
+                is_touched |= normal.is_none_or(|normal| facing.dot(normal) > ALIKE);
+            });
+            is_touched
+        }));
+        GridChanges { means, centres }
     }
 }
 

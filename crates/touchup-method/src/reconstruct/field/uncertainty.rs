@@ -254,7 +254,11 @@ pub(in crate::reconstruct) fn vertex_sigma(
         return scan;
     }
     let (field, radius) = (&evidence.params.field, evidence.params.radius);
-    let Some(mut found) = field.at(evidence.contacts, p, scratch) else {
+    let found = field.at(evidence.contacts, p, scratch);
+    if let Some(known) = evidence.known_at(p, found.as_ref()) {
+        return known.sigma.hypot(OFF_FIT * known.value);
+    }
+    let Some(mut found) = found else {
         let from_scan = evidence
             .scan_at(p)
             .map_or(0.0, |scan| (scan.foot - p).norm());

@@ -25,6 +25,7 @@ use crate::reconstruct::history::Direction;
 use crate::reconstruct::incremental::delta::{PatchDelta, PatchVertex, PublishedPatch};
 use crate::reconstruct::incremental::remesh::{Remesh, RenewedFaces};
 use crate::reconstruct::lattice::{Lattice, VertexKey};
+use crate::reconstruct::model::{KnownSurface, KnownSurfaceError, KnownSurfaces};
 use crate::reconstruct::support::Support;
 use crate::stylus::{ContactSample, ProbedPoint, SettingError, TipBody, TipShape};
 use touchup_geometry::mesh::{FaceTree, MeshError, Region, TriMesh};
@@ -299,6 +300,7 @@ impl Patcher {
                 free_space: FreeSpace::new(body, SWEPT_CELL * radius, 5.0 / 3.0 * radius),
                 probed: ProbedLog::new(params.ball()),
                 stroke_log: StrokeLog::default(),
+                known: KnownSurfaces::new(radius),
                 keeps_free_space: params.free_space,
                 radius,
                 ball: params.ball(),
@@ -352,6 +354,20 @@ impl Patcher {
         });
     }
 
+    /// Takes a surface for known: as long as there are all of the contacts that it explains, the
+    /// patch follows it between them. It goes with their undo, and comes back with their redo.
+    ///
+    /// # Errors
+    /// [`KnownSurfaceError`]
+    pub fn know(&mut self, surface: KnownSurface) -> Result<(), KnownSurfaceError> {
+        self.history.known.add(surface)
+    }
+
+    /// All surfaces taken for known, whether their contacts are there or not.
+    pub fn known(&self) -> &KnownSurfaces {
+        &self.history.known
+    }
+
     /// Refuses reconstruction on a lattice that would not fit, before making any of it; with the
     /// usual tolerance the lattice becomes coarser instead.
     ///
@@ -379,8 +395,15 @@ impl Patcher {
 
     /// Approximate number of nodes of the lattice around all contacts.
     fn nodes(&self) -> f64 {
-        let means = self.history.contacts.means().iter().map(|mean| mean.point);
-        nodes_around_contacts(means, self.params.evidence.radius, self.params.pitch())
+        let TouchHistory {
+            contacts, known, ..
+        } = &self.history;
+        let means = contacts.means().iter().map(|mean| mean.point);
+        nodes_around_contacts(
+            means.chain(known.all_places()),
+            self.params.evidence.radius,
+            self.params.pitch(),
+        )
     }
 
     /// All touches, in order of time.
@@ -440,9 +463,10 @@ impl Patcher {
         let Self {
             live,
             is_closed,
-            history: TouchHistory { bounds, .. },
+            history: TouchHistory { bounds, known, .. },
             ..
         } = before;
+        self.history.known.add_all(known);
         self.live = live.map(|live| LivePatch {
             remesh: live.remesh,
             published: live.published,
@@ -698,6 +722,7 @@ impl Patcher {
             .means()
             .iter()
             .map(|mean| mean.point)
+            .chain(self.history.known.places())
             .collect();
         let mut centres = Vec::new();
         self.history
@@ -717,6 +742,7 @@ impl Patcher {
                 TouchHistory {
                     contacts,
                     free_space,
+                    known,
                     ..
                 },
             params,
@@ -726,6 +752,7 @@ impl Patcher {
             params: &params.evidence,
             contacts,
             free_space,
+            known,
             scan,
             tree,
             prior: params.scan_prior(),

@@ -107,7 +107,7 @@ impl Remesh {
     /// Support of a vertex: touched if most of the corners of its cell are near the touched
     /// surface; for a vertex on the scan, the scan.
     pub(crate) fn support(&self, key: &VertexKey) -> Support {
-        let is_of_touch = |state: &NodeState| state.source == Source::Touch && !state.is_corner;
+        let is_of_touch = |state: &NodeState| state.source == Source::Touch && !state.is_extended;
         let is_touched = |node: &LatticeNode| self.grid.nodes.get(node).is_some_and(is_of_touch);
         let touched = match *key {
             VertexKey::Scan(_) | VertexKey::Trace { .. } | VertexKey::Pierce(..) => {

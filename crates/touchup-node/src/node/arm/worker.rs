@@ -3,7 +3,9 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, TrySendError, sync_channel};
+use std::sync::mpsc::{
+    Receiver, Sender, SyncSender, TryRecvError, TrySendError, channel, sync_channel,
+};
 use std::thread::JoinHandle;
 use std::time::{Duration, SystemTime};
 
@@ -30,10 +32,13 @@ use crate::ros::refusal::not_probed;
 use crate::ros::stop::{ArmMotion, StopState};
 use touchup_geometry::mesh::TriMesh;
 use touchup_io::probed_touches_file::append_probed_touches;
+use touchup_io::recording::{append_known_surfaces, known_surfaces_beside};
+use touchup_method::reconstruct::KnownSurface;
 use touchup_probing::arm::{Arm, StopRequest};
 use touchup_probing::execute::{Ending, Flag, FlagResult, Plan, ProbeParams, RobotCell};
 use touchup_session::probing_run::ProbingRun;
 use touchup_session::scene::simulated_arm;
+use touchup_session::session::SessionRecord;
 use touchup_sim::{MeshSurface, SimArm};
 
 /// Orders waiting for the thread: it takes one at a time, and refuses others meanwhile.
@@ -73,6 +78,8 @@ pub struct ArmHandle {
     inputs: SyncSender<FolderOrder>,
     /// state shared with the thread
     pub common: Arc<SharedArmState>,
+    /// known surfaces of probed features, with the folder of their session
+    known: Receiver<(PathBuf, KnownSurface)>,
     cell: RobotCell,
 }
 
@@ -105,6 +112,11 @@ impl ArmHandle {
         }
     }
 
+    /// Known surfaces of features probed since the last call, with the folder of their session.
+    pub fn known(&self) -> impl Iterator<Item = (PathBuf, KnownSurface)> + '_ {
+        self.known.try_iter()
+    }
+
     /// `~/arm_state`: answers at once, whatever the arm does.
     pub fn state(&self) -> TriggerResponse {
         self.common.state(&self.cell)
@@ -116,6 +128,7 @@ struct ArmWorker {
     link: ArmLink,
     port: Arc<dyn Port>,
     features: SyncSender<FeatureInput>,
+    known: Sender<(PathBuf, KnownSurface)>,
     run: ProbingRun,
     params: ProbeParams,
     inputs: Receiver<FolderOrder>,
@@ -136,12 +149,14 @@ pub fn start(
 ) -> Result<(ArmHandle, JoinHandle<()>), NodeError> {
     let (cell, params) = setup.input.scene.probing().ok_or(NodeError::NoRobot)?;
     let (to, inputs) = sync_channel(QUEUE);
+    let (to_mesh, known) = channel();
     let common = Arc::new(SharedArmState::new(Arc::clone(stops)));
     stops.look();
     let ends = EndsArm(Arc::clone(stops));
     let handle = ArmHandle {
         inputs: to,
         common: Arc::clone(&common),
+        known,
         cell: cell.clone(),
     };
     let ArmOfNode { kind, samples } = arm;
@@ -156,6 +171,7 @@ pub fn start(
         link,
         port: Arc::clone(port),
         features,
+        known: to_mesh,
         run: ProbingRun::new(cell),
         params,
         inputs,
@@ -543,6 +559,15 @@ impl ArmWorker {
         let path = folder.join(TOUCHES);
         if let Err(error) = append_probed_touches(probed, ball_radius, offset_ns, &path) {
             warn!(%error, "the touches of a feature are on the topic alone");
+        }
+        let surfaces = &probed.known_surfaces;
+        let path = known_surfaces_beside(&folder.join(SessionRecord::RECORDING));
+        match append_known_surfaces(&path, surfaces, ball_radius) {
+            Ok(surfaces) => surfaces.into_iter().for_each(|known| {
+                // without a receiver the node ends
+                let _ = self.known.send((folder.to_owned(), known));
+            }),
+            Err(error) => warn!(%error, "the surfaces of a feature are not known to its mesh"),
         }
         if let Some(measured) = measured(folder, probed) {
             let measured = FeatureInput::Measured(Box::new(measured));

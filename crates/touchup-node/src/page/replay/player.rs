@@ -24,10 +24,11 @@ use crate::ros::parameters::CELL_FRAME;
 use crate::ros::parameters::{ParameterValue, Parameters};
 use crate::ros::port::{Arrival, ReplayStep, SamplePort};
 use touchup_io::mesh_file::MeshUnit;
-use touchup_io::recording::LiveMessage;
+use touchup_io::recording::{LiveMessage, Topics};
 use touchup_io::session_folder::SessionFolder;
 use touchup_method::stylus::Message;
 use touchup_session::clock::Clock;
+use touchup_session::replay::RecordedSurfaces;
 use touchup_session::session::SessionRecord;
 
 /// Maximum number of queued messages: pauses and jumps take effect after them.
@@ -56,6 +57,18 @@ struct ReplayStage {
     inbox: Inbox,
     stylus: OtherParticipants,
     node: Node,
+}
+
+/// The changes and known surfaces of a recorded session. For a running one: to be read after its
+/// messages, so that no undo before one of them is missing.
+fn replayed_session(
+    folder: &SessionFolder,
+    recording: PathBuf,
+    topics: Topics,
+) -> Result<ReplayedSession, String> {
+    let changes = SessionRecord::strokes_of(folder.path()).map_err(|error| error.to_string())?;
+    let known = RecordedSurfaces::beside(&recording).map_err(|error| error.to_string())?;
+    Ok(ReplayedSession::new(recording, topics, known, changes))
 }
 
 impl Player {
@@ -108,10 +121,7 @@ impl Player {
         });
         let readable =
             read.map_err(|error| format!("the recording cannot be replayed: {error}"))?;
-        // for a running session: read after its messages, so that no undo before one of them is
-        // missing
-        let changes =
-            SessionRecord::strokes_of(folder.path()).map_err(|error| error.to_string())?;
+        let replayed = replayed_session(folder, recording, topics)?;
         let text = |text: &str| ParameterValue::String(text.to_owned());
         let mut parameters = Parameters::default();
         for (name, value) in [
@@ -123,12 +133,8 @@ impl Player {
             let set = parameters.set(name, &value);
             set.map_err(|error| error.to_string())?;
         }
-        let ready = PreparedNode::replayed(
-            parameters,
-            folder.clone(),
-            ReplayedSession::new(recording, topics, changes),
-        )
-        .map_err(|error| error.to_string())?;
+        let ready = PreparedNode::replayed(parameters, folder.clone(), replayed)
+            .map_err(|error| error.to_string())?;
         let clock = Clock::system();
         let (inbox, arrivals) = inbox(INBOX, &clock);
         let (network, stylus) = in_process::start_unread(inbox.clone(), &clock);

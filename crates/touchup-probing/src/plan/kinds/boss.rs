@@ -11,8 +11,9 @@ use crate::plan::search::{DEEPEST, ROUGH};
 use crate::plan::search_context::{AROUND, RING, SearchContext, TouchPlan, TouchResult};
 use crate::plan::slide::Slide;
 use touchup_features::features::Feature;
-use touchup_features::features::fit::Observation;
+use touchup_features::features::fit::{Cylinder, Fit, Observation, Plane};
 use touchup_geometry::numeric::mean;
+use touchup_method::reconstruct::KnownSurface;
 
 /// Growth of the distance in the search outward.
 const FARTHER: f64 = 1.4;
@@ -69,6 +70,18 @@ impl BossPattern {
     /// highest and deepest.
     fn depths(&self, context: &SearchContext) -> Result<[f64; 2], ExploreError> {
         context.above_ground("boss", self.ground_z, OFF_GROUND)
+    }
+
+    /// The ground around the boss, and its wall.
+    fn fitted(&self, context: &SearchContext) -> Result<(Fit<Plane>, Fit<Cylinder>), ExploreError> {
+        if self.ground.len() < 3 || self.wall.measuring.observations.len() < FIRST {
+            return Err(ExploreError::NotDone {
+                touches: context.touches,
+            });
+        }
+        let foot = surface_about(context, &self.wall.middle, &self.ground)?;
+        let wall = self.wall.fitted(context, &foot)?;
+        Ok((foot, wall))
     }
 
     fn take_top(&mut self, context: &mut SearchContext, touch: &PatternStep) {
@@ -180,13 +193,7 @@ impl TouchPattern for BossPattern {
     }
 
     fn feature(&self, context: &SearchContext) -> Result<Option<Feature>, ExploreError> {
-        if self.ground.len() < 3 || self.wall.measuring.observations.len() < FIRST {
-            return Err(ExploreError::NotDone {
-                touches: context.touches,
-            });
-        }
-        let foot = surface_about(context, &self.wall.middle, &self.ground)?;
-        let wall = self.wall.fitted(context, &foot)?;
+        let (foot, wall) = self.fitted(context)?;
         let height = |o: &Observation| context.in_f(&o.point).z;
         let highest = self
             .seen
@@ -195,6 +202,21 @@ impl TouchPattern for BossPattern {
         let top = highest.map(|contact| context.end(contact));
         let touches = numbers([&self.wall.measuring.observations, &self.ground]);
         Ok(Some(Feature::round(&wall, &foot, top.as_ref(), touches)))
+    }
+
+    fn known_surfaces(&self, context: &SearchContext) -> Result<Vec<KnownSurface>, ExploreError> {
+        let (foot, wall) = self.fitted(context)?;
+        let is_top = |o: &&Observation| {
+            (context.below(&context.in_f(&o.point)) - context.height).abs() < FLAT
+        };
+        let on_top: Vec<_> = self.seen.iter().filter(is_top).copied().collect();
+        let top = surface_about(context, &self.wall.middle, &on_top);
+        let top = top.ok().filter(|_| on_top.len() >= 3);
+        Ok(context.surfaces_of_boss(
+            (&wall, &self.wall.measuring.observations),
+            (&foot, &self.ground),
+            top.as_ref().map(|top| (top, &*on_top)),
+        ))
     }
 
     fn uncertainty(&self, context: &SearchContext) -> Option<f64> {

@@ -11,8 +11,9 @@ use crate::plan::search::ROUGH;
 use crate::plan::search_context::{PatternParams, RING, SearchContext, TouchPlan, TouchResult};
 use crate::plan::slide::{RimStation, Slide};
 use touchup_features::features::Feature;
-use touchup_features::features::fit::{FitParams, Freedom, Observation, Plane};
+use touchup_features::features::fit::{Fit, FitParams, Freedom, Observation, Plane};
 use touchup_geometry::numeric::mean;
+use touchup_method::reconstruct::KnownSurface;
 
 /// Depth below the top that is beyond the edge, over the ball's radius.
 const BEYOND: f64 = 0.8;
@@ -237,6 +238,19 @@ impl EdgePattern {
         plane(context, at.coords, [self.over, self.along(), Vector3::z()])
     }
 
+    /// Top and side.
+    fn fitted(&self, context: &SearchContext) -> Result<[Fit<Plane>; 2], ExploreError> {
+        if self.phase != EdgePhase::Both {
+            return Err(ExploreError::NotDone {
+                touches: context.touches,
+            });
+        }
+        let params = FitParams::default();
+        let top = self.top.fitted(&self.top_plane(context), &params)?;
+        let side = self.side.fitted(&self.side_plane(context), &params)?;
+        Ok([top, side])
+    }
+
     /// Request for the top, with y along the edge, or for the side, with x along it.
     fn wanted(params: &PatternParams, lean: Freedom) -> SurfaceRequest {
         // within the reach of its touches
@@ -407,14 +421,7 @@ impl TouchPattern for EdgePattern {
     }
 
     fn feature(&self, context: &SearchContext) -> Result<Option<Feature>, ExploreError> {
-        if self.phase != EdgePhase::Both {
-            return Err(ExploreError::NotDone {
-                touches: context.touches,
-            });
-        }
-        let params = FitParams::default();
-        let top = self.top.fitted(&self.top_plane(context), &params)?;
-        let side = self.side.fitted(&self.side_plane(context), &params)?;
+        let [top, side] = self.fitted(context)?;
         let along = |o: &Observation| context.in_f(&o.point).coords.dot(&self.along());
         let all = || {
             self.top
@@ -433,6 +440,14 @@ impl TouchPattern for EdgePattern {
         };
         let touches = numbers([&self.top.observations, &self.side.observations]);
         Ok(Feature::edge([&top, &side], &ends.map(at), true, touches))
+    }
+
+    fn known_surfaces(&self, context: &SearchContext) -> Result<Vec<KnownSurface>, ExploreError> {
+        let [top, side] = self.fitted(context)?;
+        Ok(context.surfaces_of_edge([
+            (&top, &self.top.observations),
+            (&side, &self.side.observations),
+        ]))
     }
 
     fn uncertainty(&self, context: &SearchContext) -> Option<f64> {

@@ -15,8 +15,9 @@ use crate::plan::pattern::{PatternStep, TouchPattern};
 use crate::plan::search::{BELOW_RIM, BESIDE, CHAMFER, OpeningSearch, REACH, ROUGH, SHALLOW};
 use crate::plan::search_context::{AROUND, PatternParams, SearchContext, TouchPlan, TouchResult};
 use crate::plan::slide::Slide;
-use touchup_features::features::fit::Observation;
+use touchup_features::features::fit::{Cylinder, Fit, Observation, Plane};
 use touchup_features::features::{End, Feature};
+use touchup_method::reconstruct::KnownSurface;
 
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 enum HolePhase {
@@ -48,6 +49,19 @@ impl HolePattern {
             depth: params.depth.max(SHALLOW * params.ball_radius),
             ..Self::default()
         }
+    }
+
+    /// The surface around the hole, and its wall.
+    fn fitted(&self, context: &SearchContext) -> Result<(Fit<Plane>, Fit<Cylinder>), ExploreError> {
+        if self.opening.top.len() < 3 || self.wall.measuring.observations.len() < FIRST {
+            return Err(OpeningSearch::not_done(
+                context,
+                self.phase == HolePhase::Opening,
+            ));
+        }
+        let top = surface_about(context, &self.wall.middle, &self.opening.top)?;
+        let wall = self.wall.fitted(context, &top)?;
+        Ok((top, wall))
     }
 
     fn take_first(&mut self, context: &SearchContext, touch: &PatternStep) {
@@ -124,14 +138,7 @@ impl TouchPattern for HolePattern {
     }
 
     fn feature(&self, context: &SearchContext) -> Result<Option<Feature>, ExploreError> {
-        if self.opening.top.len() < 3 || self.wall.measuring.observations.len() < FIRST {
-            return Err(OpeningSearch::not_done(
-                context,
-                self.phase == HolePhase::Opening,
-            ));
-        }
-        let top = surface_about(context, &self.wall.middle, &self.opening.top)?;
-        let wall = self.wall.fitted(context, &top)?;
+        let (top, wall) = self.fitted(context)?;
         let touches = numbers([&self.wall.measuring.observations, &self.opening.top]);
         Ok(Some(Feature::round(
             &wall,
@@ -139,6 +146,15 @@ impl TouchPattern for HolePattern {
             self.floor.as_ref(),
             touches,
         )))
+    }
+
+    fn known_surfaces(&self, context: &SearchContext) -> Result<Vec<KnownSurface>, ExploreError> {
+        let (top, wall) = self.fitted(context)?;
+        Ok(context.surfaces_of_hole(
+            (&wall, &self.wall.measuring.observations),
+            (&top, &self.opening.top),
+            self.floor.as_ref(),
+        ))
     }
 
     fn uncertainty(&self, context: &SearchContext) -> Option<f64> {

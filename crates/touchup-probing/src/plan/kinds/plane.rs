@@ -11,7 +11,8 @@ use crate::plan::search::{ROUGH, hexagonal};
 use crate::plan::search_context::{PatternParams, SearchContext, TouchPlan, TouchResult, toward};
 use crate::plan::slide::Slide;
 use touchup_features::features::Feature;
-use touchup_features::features::fit::{FitParams, Freedom, Observation, Plane};
+use touchup_features::features::fit::{Fit, FitParams, Freedom, Observation, Plane};
+use touchup_method::reconstruct::KnownSurface;
 
 /// Candidate places across the field.
 const ACROSS: f64 = 6.0;
@@ -56,6 +57,16 @@ impl PlanePattern {
             LEAN,
             LEAST,
         )
+    }
+
+    fn fitted(&self, context: &SearchContext) -> Result<Fit<Plane>, ExploreError> {
+        if self.measuring.observations.len() < FIRST {
+            return Err(ExploreError::NotDone {
+                touches: context.touches,
+            });
+        }
+        self.measuring
+            .fitted(&Self::guess(context), &FitParams::default())
     }
 
     fn possible(&self, context: &SearchContext) -> Vec<CandidateTouch> {
@@ -126,20 +137,18 @@ impl TouchPattern for PlanePattern {
     }
 
     fn feature(&self, context: &SearchContext) -> Result<Option<Feature>, ExploreError> {
-        if self.measuring.observations.len() < FIRST {
-            return Err(ExploreError::NotDone {
-                touches: context.touches,
-            });
-        }
-        let fitted = self
-            .measuring
-            .fitted(&Self::guess(context), &FitParams::default())?;
+        let fitted = self.fitted(context)?;
         let middle = context.pose_of * Point3::origin();
         Ok(Some(Feature::plane(
             &fitted,
             &middle,
             numbers([&self.measuring.observations]),
         )))
+    }
+
+    fn known_surfaces(&self, context: &SearchContext) -> Result<Vec<KnownSurface>, ExploreError> {
+        let fitted = self.fitted(context)?;
+        Ok(context.surfaces_of_plane((&fitted, &self.measuring.observations)))
     }
 
     fn uncertainty(&self, context: &SearchContext) -> Option<f64> {

@@ -8,6 +8,7 @@ use crate::plan::search::{ROUGH, hexagonal};
 use crate::plan::search_context::{PatternParams, SearchContext, TouchPlan};
 use crate::plan::slide::Slide;
 use touchup_features::features::Feature;
+use touchup_method::reconstruct::KnownSurface;
 
 #[derive(Clone, Debug)]
 pub(in crate::plan) struct RegionPattern {
@@ -75,6 +76,10 @@ impl TouchPattern for RegionPattern {
 
     fn feature(&self, _: &SearchContext) -> Result<Option<Feature>, ExploreError> {
         Ok(None)
+    }
+
+    fn known_surfaces(&self, _: &SearchContext) -> Result<Vec<KnownSurface>, ExploreError> {
+        Ok(Vec::new())
     }
 
     fn uncertainty(&self, _: &SearchContext) -> Option<f64> {

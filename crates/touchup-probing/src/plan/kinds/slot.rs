@@ -29,9 +29,10 @@ use crate::plan::search_context::{
 };
 use crate::plan::slide::{RimStation, Slide, stadium_rim};
 use touchup_features::features::fit::{
-    Ends, FitParams, Freedom, Observation, Stadium, SurfaceModel, fit,
+    Ends, Fit, FitParams, Freedom, Observation, Plane, Stadium, SurfaceModel, fit,
 };
 use touchup_features::features::{End, Feature};
+use touchup_method::reconstruct::KnownSurface;
 
 /// Freedom in which walls may lean: across the slot, by both walls. Along it only the ends would
 /// show a lean, and an assumed end may be an obstacle.
@@ -178,6 +179,22 @@ impl SlotPattern {
             &self.measuring.observations,
             &LEAN,
         )
+    }
+
+    /// The surface around the slot, and its walls.
+    fn fitted(&self, context: &SearchContext) -> Result<(Fit<Plane>, Fit<Stadium>), ExploreError> {
+        let not_done = || OpeningSearch::not_done(context, self.phase == SlotPhase::Opening);
+        let walls = self
+            .walls
+            .as_ref()
+            .filter(|_| self.opening.top.len() >= 3)
+            .ok_or_else(not_done)?;
+        let top = surface_about(context, &context.in_f(&walls.center()), &self.opening.top)?;
+        let (_, params) = self.squareness(context, walls);
+        let fitted = self.measuring.fitted(walls, &params)?;
+        // an untouched end leaves length and middle open
+        fitted.std(Freedom::Second).ok_or_else(not_done)?;
+        Ok((top, fitted))
     }
 
     fn wanted(&self, context: &SearchContext, walls: &Stadium) -> SurfaceRequest {
@@ -573,17 +590,7 @@ impl TouchPattern for SlotPattern {
     }
 
     fn feature(&self, context: &SearchContext) -> Result<Option<Feature>, ExploreError> {
-        let not_done = || OpeningSearch::not_done(context, self.phase == SlotPhase::Opening);
-        let walls = self
-            .walls
-            .as_ref()
-            .filter(|_| self.opening.top.len() >= 3)
-            .ok_or_else(not_done)?;
-        let top = surface_about(context, &context.in_f(&walls.center()), &self.opening.top)?;
-        let (_, params) = self.squareness(context, walls);
-        let fitted = self.measuring.fitted(walls, &params)?;
-        // an untouched end leaves length and middle open
-        fitted.std(Freedom::Second).ok_or_else(not_done)?;
+        let (top, fitted) = self.fitted(context)?;
         let touches = numbers([&self.measuring.observations, &self.opening.top]);
         Ok(Some(Feature::slot(
             &fitted,
@@ -591,6 +598,15 @@ impl TouchPattern for SlotPattern {
             self.floor.as_ref(),
             touches,
         )))
+    }
+
+    fn known_surfaces(&self, context: &SearchContext) -> Result<Vec<KnownSurface>, ExploreError> {
+        let (top, walls) = self.fitted(context)?;
+        Ok(context.surfaces_of_slot(
+            (&walls, &self.measuring.observations),
+            (&top, &self.opening.top),
+            self.floor.as_ref(),
+        ))
     }
 
     fn uncertainty(&self, context: &SearchContext) -> Option<f64> {
