@@ -143,8 +143,10 @@ pub(super) fn holes(parted: &SegmentedMesh, walls: &[Wall], touches: &[ProbedPoi
     let numbers = (0..walls.len()).filter(|&at| is_hole(&walls[at]));
     let numbers = numbers.filter(|&at| !is_rim_of_cone(parted, &walls[at], touches));
     let found: Vec<Hole> = numbers.filter_map(|at| hole(parted, walls, at)).collect();
-    let is_of =
-        |hole: &Hole, other: &Hole| is_fragment_of(parted, &walls[hole.wall], &walls[other.wall]);
+    let is_of = |hole: &Hole, other: &Hole| {
+        is_fragment_of(parted, &walls[hole.wall], &walls[other.wall])
+            || is_far_mouth(parted, walls, hole, other)
+    };
     found
         .iter()
         .filter(|hole| !found.iter().any(|other| is_of(hole, other)))
@@ -201,6 +203,40 @@ fn is_fragment_of(parted: &SegmentedMesh, wall: &Wall, better: &Wall) -> bool {
         && (is_crooked || wider < part.tolerance)
         && wider.max(aside) < REST * better.radius()
         && beyond < better.radius() + wall.height()
+}
+
+/// Whether a hole is the far mouth of a larger one: both go through, each opens where the other
+/// ends, and the part goes on between them. Mouths felt along their edges alone have walls that
+/// lean.
+fn is_far_mouth(parted: &SegmentedMesh, walls: &[Wall], hole: &Hole, larger: &Hole) -> bool {
+    let [wall, of_larger] = [hole, larger].map(|hole| &walls[hole.wall]);
+    let apart = larger.opening - hole.opening;
+    let (through, radius) = (apart.normalize(), of_larger.radius());
+    let is_facing = hole.wall > larger.wall
+        && hole.through == Some(true)
+        && larger.through == Some(true)
+        && (wall.radius() - radius).abs() < SAME_AXIS * radius
+        && hole.out.dot(&through) < -SQUARE
+        && larger.out.dot(&through) > SQUARE;
+    if !is_facing {
+        return false;
+    }
+    // from inside of a plate a line meets the back of its face
+    let (middle, [e, g]) = (hole.opening + apart / 2.0, tangent_basis(&through));
+    let mut rays = parted.around(wall.segments[0]).rays(radius);
+    let mut is_inside = |aside: &Vector3<f64>| {
+        let met = rays.first(
+            &(middle + aside * (RINGS[1] * radius)),
+            &through,
+            apart.norm(),
+        );
+        met.is_some_and(|met| parted.facets.normal(met.face.0).dot(&through) > 0.0)
+    };
+    let inside = [e, -e, g, -g]
+        .iter()
+        .filter(|aside| is_inside(aside))
+        .count();
+    inside >= 2
 }
 
 fn hole(parted: &SegmentedMesh, walls: &[Wall], at: usize) -> Option<Hole> {

@@ -220,7 +220,8 @@ impl SphereSearch<'_> {
         }
     }
 
-    /// What of a region is a sphere's own, if it is one; its pieces are given up.
+    /// The faces of a region that no larger segment has, as one sphere; `None`: a segment has most of
+    /// them already. The segments that they had go.
     fn rest(&mut self, sphere: Sphere, mut faces: Vec<u32>) -> Option<Segment> {
         let whole = self.facets.area_of(&faces);
         let mut shares: BTreeMap<u32, f64> = BTreeMap::new();

@@ -18,6 +18,8 @@ const BESIDE_LAND: std::ops::Range<f64> = -0.7..0.95;
 /// Cosine of the maximum lean of a contact at the edge of its surface: 75°; error of that lean, rad.
 const ROLLED: f64 = 0.26;
 const TURNED: f64 = 0.12;
+/// Share of a contact at an edge that each of the two surfaces explains that meet there.
+const OF_EDGE: f64 = 0.5;
 /// Maximum number of contacts in a fit.
 pub(super) const MOST_FITTED: usize = 300;
 
@@ -104,10 +106,11 @@ impl<'a> Costs<'a> {
 
     /// The same on the surface or at its edge; `None`: neither.
     pub(super) fn explained_with_edge(&self, primitive: &Primitive, at: u32) -> Option<f64> {
-        let misfit = self.misfit(primitive, at);
-        misfit
-            .or_else(|| self.misfit_at_edge(primitive, at))
-            .map(Self::score)
+        let on_face = self.misfit(primitive, at).map(Self::score);
+        on_face.or_else(|| {
+            let at_edge = self.misfit_at_edge(primitive, at);
+            at_edge.map(|misfit| OF_EDGE * Self::score(misfit))
+        })
     }
 
     pub(super) fn price(shape: &TouchedShape, count: usize) -> f64 {

@@ -53,7 +53,7 @@ pub(crate) struct FieldValue {
     pub gradient: Vector3<f64>,
     /// distance to the nearest contact, or to the extent of a known surface, m
     pub nearest: f64,
-    /// what the value is of
+    /// the evidence that decides the value
     pub origin: FieldOrigin,
     /// the nearest contact is on an edge that the ball rolled over
     pub is_fan: bool,
