@@ -12,6 +12,7 @@
 //! Frames: those of [`touchup_method`]; units: those of [`touchup_geometry`].
 #![cfg_attr(not(test), warn(clippy::unwrap_used))]
 
+mod adjustment;
 pub mod align;
 pub mod calibrate;
 pub mod compare;

@@ -40,6 +40,8 @@ fn pair(bytes: &mut Unstructured) -> Result<()> {
     }
     .expect("settings in their range");
     let monitored = InputMonitorParams {
+        stiffness_share: 0.02,
+        place_sigma: 2e-6,
         compensator: CompensatorParams::default(),
         tip: BALL,
         shape: TipShape::Ball,

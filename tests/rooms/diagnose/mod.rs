@@ -71,6 +71,8 @@ fn findings(input: &ToldRecording) -> Vec<InputFinding> {
     let mut monitor = InputMonitor::new(InputMonitorParams {
         compensator: CompensatorParams::default(),
         tip: input.tip,
+        stiffness_share: 0.02,
+        place_sigma: 2e-6,
         shape: TipShape::Ball,
         scan_noise: 0.0,
         placement: Placement::default(),
@@ -243,6 +245,46 @@ fn a_hole_that_the_scan_has_closed_is_no_other_place_of_the_part() {
         });
         assert_eq!(on_flat_scan(wall), [], "{share} of the hole");
     }
+}
+
+/// A ball that slides over the flat scan while the stylus turns about it by up to 50°, recorded at
+/// `offset_t` (m, in the axes of the stylus) from where it is, and sinking by `compliance`, m/N.
+fn slides(offset_t: Vector3<f64>, compliance: f64) -> Vec<(InputCause, bool)> {
+    let messages = recorded(40.0, |t| {
+        let lift = (6e-3 * (2.0 * t).sin() - 5e-3).max(0.0);
+        let force = match lift > 0.0 {
+            true => 0.0,
+            false => 2.0 + (3.1 * t).sin(),
+        };
+        let at = Vector3::new(
+            24e-3 * (0.9 * t).sin(),
+            24e-3 * (0.37 * t).sin(),
+            1.5e-3 + lift - compliance * force,
+        );
+        let lean = Vector3::new((1.3 * t).sin(), (0.8 * t).cos(), 0.0) * 0.6;
+        let rotation = UnitQuaternion::from_scaled_axis(lean);
+        let pose = Isometry3::from_parts((at - rotation * offset_t).into(), rotation);
+        (
+            pose,
+            rotation.inverse_transform_vector(&(Vector3::z() * force)),
+        )
+    });
+    let found = on_flat_scan(messages);
+    found
+        .iter()
+        .map(|found| (found.cause, found.is_sure))
+        .collect()
+}
+
+#[test]
+fn presses_among_themselves_show_where_the_ball_is_and_how_it_sinks() {
+    let none = Vector3::zeros();
+    assert_eq!(slides(none, 0.0), []);
+    for offset in [Vector3::x() * 0.3e-3, Vector3::z() * -0.3e-3] {
+        assert_eq!(slides(offset, 0.0), [(InputCause::TipOffset, true)]);
+    }
+    // 0.06 mm under the usual 2 N
+    assert_eq!(slides(none, 0.06e-3), [(InputCause::Stiffness, true)]);
 }
 
 /// Three touches on the flat scan, whose surface lies at `height`, m.

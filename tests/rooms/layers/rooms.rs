@@ -30,7 +30,8 @@ pub const MAY_USE: &[(&str, &str)] = &[
     ("align", "numeric mesh features"),
     ("compare", "numeric stylus mesh align features"),
     ("calibrate", "numeric stylus mesh align features"),
-    ("diagnose", "numeric stylus mesh"),
+    ("adjustment", "numeric stylus features"),
+    ("diagnose", "numeric stylus mesh adjustment"),
     (
         "io",
         "numeric parameters stylus mesh form brep reconstruct features conformity align arm execute",

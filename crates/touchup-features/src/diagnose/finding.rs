@@ -51,6 +51,8 @@ names! {
         Frame = "frame",
         /// Distance from ball centre to surface differs from the tip radius.
         Radius = "radius",
+        /// The ball is at another place of the stylus.
+        TipOffset = "tip_offset",
         /// The stylus bends more or less than its stiffness predicts.
         Stiffness = "stiffness",
         /// Forces clipped at one value.
@@ -68,12 +70,13 @@ impl InputCause {
             | Self::PositionAxes
             | Self::Frame
             | Self::Radius
-            | Self::Stiffness
             | Self::InsideOut
             | Self::WrenchSign
             | Self::WrenchFrame
             | Self::QuaternionOrder => true,
-            Self::ZeroStamps
+            Self::Stiffness
+            | Self::TipOffset
+            | Self::ZeroStamps
             | Self::TwoEpochs
             | Self::TimeUnit
             | Self::StampsGoBack

@@ -12,7 +12,6 @@ use super::monitor_params::InputMonitorParams;
 use super::places::{
     ALIKE, BallFit, LEAST_TOLERANCE, SHARE_ON_SCAN, ScanScale, error_of_median, is_in_hole,
 };
-use super::stiffness::{SunkPress, judge_stiffness};
 use super::wrench::{ReadPress, course_at, judge_wrench};
 use touchup_geometry::mesh::{FaceTree, TriMesh};
 use touchup_geometry::numeric::{SIGMA_OF_MEDIAN, VoxelKey, counted, median, voxel_of};
@@ -76,6 +75,8 @@ pub(super) struct InputJudge<'a> {
     pub scan: &'a TriMesh,
     pub tree: &'a FaceTree,
     pub records: &'a [InputRecord],
+    /// samples with a force above the contact threshold
+    pub pressing: &'a [InputRecord],
     /// standard deviation of one force axis, N
     pub noise: f64,
     /// smallest change of a component of the measured force, N
@@ -131,9 +132,15 @@ impl InputJudge<'_> {
             findings.extend(if is_explained { wrench } else { Some(few) });
             return findings;
         }
-        // turned forces select other presses
-        let is_registration = wrench.is_none() && !is_doubted_place;
-        let registration = is_registration
+        // turned forces select other presses, and show other surfaces
+        let is_read = wrench.is_none() && !is_doubted_place;
+        let mut of_session = if is_read {
+            self.judge_session(&presses)
+        } else {
+            Vec::new()
+        };
+        // a ball at another place looks like a scan at another one
+        let registration = (is_read && of_session.is_empty())
             .then(|| self.judge_registration(&presses))
             .flatten();
         findings.extend(registration);
@@ -141,15 +148,16 @@ impl InputJudge<'_> {
         if wrench.is_none() && !findings.iter().any(|finding| finding.is_sure) {
             findings.extend(self.judge_clock());
         }
-        let stiffness = (wrench.is_none() && findings.is_empty())
-            .then(|| self.judge_stiffness(&presses))
-            .flatten();
+        if findings.iter().any(|finding| finding.is_sure) {
+            of_session.clear();
+        }
         // radius last: a wrong place or stiffness moves the centre as far
-        let is_explained = wrench.is_some() || stiffness.is_some() || is_doubted_place;
+        let is_explained = wrench.is_some() || !of_session.is_empty() || is_doubted_place;
         let radius = (!is_explained)
             .then(|| self.judge_radius(&presses))
             .flatten();
-        findings.extend(stiffness.or(radius));
+        findings.extend(of_session);
+        findings.extend(radius);
         findings.extend(wrench);
         findings
     }
@@ -427,46 +435,6 @@ impl InputJudge<'_> {
             &axes,
             [normal, course],
             [force_o, in_other_frame, by_w_first],
-        )
-    }
-
-    /// Checks whether the ball sinks with the force as its stiffness predicts.
-    fn judge_stiffness(&self, presses: &Presses) -> Option<InputFinding> {
-        let Presses {
-            levels,
-            scale,
-            tolerance,
-            sunk,
-            ..
-        } = presses;
-        let records = || {
-            self.records
-                .iter()
-                .filter(|record| levels.off_rest(record) > NOISES * levels.noise)
-        };
-        let fit = self.fit_at(records().map(|record| record.centre), *tolerance);
-        let is_straight = |record: &InputRecord, normal: &Vector3<f64>| {
-            let force = levels.force_o(record);
-            force.dot(normal) > STRAIGHT * force.norm()
-        };
-        let sunken: Vec<SunkPress> = records()
-            .zip(fit.distances.iter().zip(&fit.normals))
-            .filter(|(record, (distance, normal))| {
-                (**distance - self.params.tip.radius).abs() <= tolerance + sunk
-                    && is_straight(record, normal)
-            })
-            .map(|(record, (distance, _))| SunkPress {
-                centre: record.centre,
-                distance: *distance,
-                force: levels.off_rest(record),
-            })
-            .collect();
-        let told = self.params.tip.stiffness.map_or(0.0, f64::recip);
-        judge_stiffness(
-            &sunken,
-            told,
-            PLACE_EDGES * scale.edge.max(LEAST_BALL),
-            levels.largest,
         )
     }
 

@@ -16,9 +16,9 @@ mod monitor_params;
 mod placed;
 mod places;
 mod registration;
+mod session;
 mod shift;
 mod stamps;
-mod stiffness;
 mod wrench;
 
 pub use finding::{InputCause, InputFinding};

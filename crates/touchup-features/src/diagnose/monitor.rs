@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::finding::{InputCause, InputFinding};
-use super::input_record::InputRecord;
+use super::input_record::{InputRecord, ThinnedRecords};
 use super::judge::{FEWEST_PRESSES, InputJudge};
 use super::monitor_params::InputMonitorParams;
 use super::stamps::InputStamps;
@@ -16,6 +16,8 @@ use touchup_method::stylus::{
 
 /// Maximum number of kept samples: of 60 s at 1 kHz one in sixteen.
 const MOST_RECORDS: usize = 4096;
+/// Maximum number of kept presses: surfaces need neighbours on them.
+const MOST_PRESSES: usize = 16384;
 /// Maximum number of force steps for the noise estimate.
 const MOST_STEPS: usize = 4096;
 /// Median length of a vector of three standard normal components.
@@ -28,10 +30,10 @@ pub struct InputMonitor {
     compensator: Compensator,
     stamps: InputStamps,
     clock: ClockEstimator,
-    records: Vec<InputRecord>,
+    records: ThinnedRecords<MOST_RECORDS>,
+    /// those with a force above the contact threshold
+    presses: ThinnedRecords<MOST_PRESSES>,
     samples: u64,
-    /// one sample in this number stays
-    stride: u64,
     last_force: Option<Vector3<f64>>,
     /// |F − previous F|, N
     steps: Vec<f64>,
@@ -98,9 +100,9 @@ impl InputMonitor {
             clock: ClockEstimator::new(params.tip.stiffness)?,
             params,
             stamps: InputStamps::default(),
-            records: Vec::new(),
+            records: ThinnedRecords::default(),
+            presses: ThinnedRecords::default(),
             samples: 0,
-            stride: 1,
             last_force: None,
             steps: Vec::new(),
             changes: Default::default(),
@@ -131,29 +133,26 @@ impl InputMonitor {
         for (changes, component) in self.changes.iter_mut().zip(&force) {
             changes.push(*component);
         }
-        let is_kept = self.samples.is_multiple_of(self.stride);
-        if is_kept {
-            if self.records.len() == MOST_RECORDS {
-                let mut at = 0;
-                self.records.retain(|_| {
-                    at += 1;
-                    at % 2 == 1
-                });
-                self.stride *= 2;
-            }
-            let tip = self.compensator.compensate(sample);
-            self.records.push(InputRecord {
-                centre: tip.pose_ot.translation.vector.into(),
-                rotation: tip.pose_ot.rotation,
-                force_o: tip.force_o,
-            });
-            if let Some(last) = self.last_force {
-                if self.steps.len() == MOST_STEPS {
-                    let at = (self.samples / self.stride) as usize % MOST_STEPS;
-                    self.steps[at] = (force - last).norm();
-                } else {
-                    self.steps.push((force - last).norm());
-                }
+        let tip = self.compensator.compensate(sample);
+        let record = || InputRecord {
+            stamp_ns: tip.stamp_ns,
+            centre: tip.pose_ot.translation.vector.into(),
+            rotation: tip.pose_ot.rotation,
+            force_o: tip.force_o,
+        };
+        let on = self.params.gate.map_or(0.0, |gate| gate.on);
+        if tip.force_o.norm_squared() > on * on {
+            self.presses.push(record);
+        }
+        if let Some(number) = self.records.push(record)
+            && let Some(last) = self.last_force
+        {
+            let step = (force - last).norm();
+            if self.steps.len() == MOST_STEPS {
+                let at = number as usize % MOST_STEPS;
+                self.steps[at] = step;
+            } else {
+                self.steps.push(step);
             }
         }
         self.last_force = Some(force);
@@ -188,7 +187,7 @@ impl InputMonitor {
         if findings.iter().any(|finding| finding.is_sure) {
             return findings;
         }
-        if self.records.len() < FEWEST_PRESSES {
+        if self.records.kept.len() < FEWEST_PRESSES {
             let [poses, wrenches] = self.stamps.counts();
             let measured = format!(
                 "{} of {wrenches} wrenches and {poses} poses became a sample",
@@ -209,7 +208,8 @@ impl InputMonitor {
             params: &self.params,
             scan,
             tree,
-            records: &self.records,
+            records: &self.records.kept,
+            pressing: &self.presses.kept,
             noise,
             force_step: self
                 .changes

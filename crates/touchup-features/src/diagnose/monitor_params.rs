@@ -11,6 +11,10 @@ pub struct InputMonitorParams {
     pub compensator: CompensatorParams,
     /// size and stiffness of the tip
     pub tip: TipParams,
+    /// standard uncertainty of the stiffness, as a share
+    pub stiffness_share: f64,
+    /// standard uncertainty of the place of the ball along each axis, m
+    pub place_sigma: f64,
     /// shape of the tip; the radius check needs a ball
     pub shape: TipShape,
     /// standard deviation of the scan, m; 0: not known

@@ -329,7 +329,8 @@ impl InputJudge<'_> {
         })
     }
 
-    /// The place of the ball along a stylus axis that puts most presses on the scan.
+    /// The place of the ball along a stylus axis that puts most presses on the scan; `None` if the
+    /// stylus turned too little to tell it from a part that lies elsewhere.
     fn best_tip(&self, presses: &Presses) -> Option<PlaceMend> {
         let records = &presses.records;
         let every = records.len().div_ceil(TIP_JUDGES).max(1);
@@ -342,8 +343,12 @@ impl InputJudge<'_> {
             .flat_map(|axis| (-count..=count).map(move |steps| (steps, at(axis, steps))))
             .map(|(steps, mend)| (share(&mend), steps, mend))
             .max_by(|a, b| a.0.total_cmp(&b.0))?;
+        let moved =
+            |record: &InputRecord| mend.centre(&self.params.placement, record) - record.centre;
+        let moves = judges.iter().map(|record| moved(record).into());
+        let is_turned = extent_of(moves) > presses.tolerance;
         // a maximum at the end of the search range is no optimum
-        (steps.abs() < count).then_some(mend)
+        (steps.abs() < count && is_turned).then_some(mend)
     }
 
     /// The common shift that brings many more contacts onto the scan, and explains more of them

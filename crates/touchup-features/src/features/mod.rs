@@ -40,4 +40,6 @@ pub use segmentation::clusters::{
 };
 pub use segmentation::curvature::{VertexCurvature, VertexKind, curvature};
 pub use segmentation::k_means::{KMeans, k_means};
+pub(crate) use segmentation::primitive::Primitive;
+pub(crate) use surfaces::touched_surfaces;
 pub use track::Tracker;

@@ -134,9 +134,12 @@ impl Scene {
             .refine
             .as_ref()
             .is_none_or(|refine| refine.mode == Mode::Robust);
+        let calibration = self.uncertainty.unwrap_or_default().calibration;
         InputMonitorParams {
             compensator: self.compensator_params(wrench_frame),
             tip: self.tip_params(),
+            stiffness_share: calibration.stiffness_share,
+            place_sigma: calibration.place,
             shape: self.tip_shape(),
             scan_noise: self.scan_noise(),
             placement: self.placement().unwrap_or_default(),

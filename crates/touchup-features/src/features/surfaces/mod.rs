@@ -35,7 +35,7 @@ const CORNER: f64 = 1.05;
 const ROUNDED_EDGE: f64 = 0.3;
 
 /// All surfaces that touches show.
-pub(in crate::features) fn touched_surfaces(touches: &[ProbedPoint]) -> Vec<TouchedSurface> {
+pub(crate) fn touched_surfaces(touches: &[ProbedPoint]) -> Vec<TouchedSurface> {
     let contacts = Contacts::of(touches);
     if contacts.all.is_empty() {
         return Vec::new();

@@ -4,7 +4,7 @@ use crate::features::segmentation::primitive::Primitive;
 use crate::features::segmentation::segment::FeltPlace;
 
 /// A surface, and the touches that it explains.
-pub(in crate::features) struct TouchedSurface {
+pub(crate) struct TouchedSurface {
     pub primitive: Primitive,
     /// by the numbers of their touches
     pub felt: Vec<FeltPlace>,

@@ -1,0 +1,22 @@
+//! One least-squares adjustment of a session: the surfaces of the part together with what the
+//! session is made with, from its contacts alone.
+//!
+//! A press on a surface with signed distance d, whose recorded centre p and turn R of the stylus
+//! were taken with a ball that is o off its assumed place in T and sinks by κ F:
+//!
+//! d(p + R o + κ F) = r
+//!
+//! The surfaces, κ and o are unknowns of one robust problem, as in a self-calibrating bundle
+//! (Brown 1971; Triggs et al. 2000). The scan is no part of it. A plane takes up any o in whose
+//! direction the stylus does not turn: what the presses do not determine stays as uncertain as
+//! before them.
+
+mod pressed_surface;
+mod problem;
+mod recorded_press;
+
+pub(crate) use problem::SessionAdjustment;
+pub(crate) use recorded_press::{RecordedPress, SessionNumbers};
+
+#[cfg(test)]
+mod tests;
