@@ -10,13 +10,26 @@
 //! (Brown 1971; Triggs et al. 2000). The scan is no part of it. A plane takes up any o in whose
 //! direction the stylus does not turn: what the presses do not determine stays as uncertain as
 //! before them.
+//!
+//! While the session lasts the part may move, or the tip bend, at once or slowly: places that were
+//! touched before and after show it. Each such change at each of some times is one more set of
+//! unknowns, and the alternatives compete by their likelihood, each with a price for its unknowns
+//! (Schwarz 1978).
 
+mod along_time;
+mod merged;
+mod numbers;
+mod placed_press;
 mod pressed_surface;
 mod problem;
 mod recorded_press;
+mod session_adjustment;
+mod session_change;
 
-pub(crate) use problem::SessionAdjustment;
-pub(crate) use recorded_press::{RecordedPress, SessionNumbers};
+pub(crate) use numbers::SessionNumbers;
+pub(crate) use recorded_press::RecordedPress;
+pub(crate) use session_adjustment::{LikelyChange, SessionAdjustment};
+pub(crate) use session_change::{ChangeCause, ChangeCourse};
 
 #[cfg(test)]
 mod tests;

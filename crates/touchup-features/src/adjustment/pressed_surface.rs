@@ -1,28 +1,36 @@
 //! Surfaces in the presses of a session.
 
+use std::collections::BTreeSet;
+
 use nalgebra::{Point3, Vector3};
 
-use super::recorded_press::{RecordedPress, SessionNumbers};
+use super::numbers::SessionNumbers;
+use super::recorded_press::RecordedPress;
+use super::session_change::SessionChange;
 use crate::features::fit::{Steps, SurfaceModel};
 use crate::features::{Primitive, touched_surfaces};
 use touchup_method::stylus::ProbedPoint;
 
 /// A surface, and the numbers of the presses on it.
+#[derive(Clone)]
 pub(super) struct PressedSurface {
     pub primitive: Primitive,
     pub presses: Vec<u32>,
 }
 
-/// The surfaces that presses show with these numbers of the session.
+/// The surfaces that presses show with these numbers of the session, and the presses that are on none
+/// and at no edge.
 ///
 /// - `radius`: of the ball, m.
 pub(super) fn pressed_surfaces(
     presses: &[RecordedPress],
     radius: f64,
     session: &SessionNumbers,
-) -> Vec<PressedSurface> {
+    change: Option<&SessionChange>,
+) -> (Vec<PressedSurface>, Vec<u32>) {
     let touch = |(number, press): (usize, &RecordedPress)| {
-        let (centre, normal) = (press.placed(session), press.force.normalize());
+        let placed = press.placed(session, change);
+        let (centre, normal) = (placed.centre, placed.force);
         ProbedPoint {
             stamp_ns: number as i64,
             stroke: press.stroke,
@@ -38,17 +46,19 @@ pub(super) fn pressed_surfaces(
         }
     };
     let touches: Vec<ProbedPoint> = presses.iter().enumerate().map(touch).collect();
-    let surfaces = touched_surfaces(&touches).into_iter();
-    let pressed = surfaces.map(|surface| {
+    let surfaces = touched_surfaces(&touches);
+    let felt = surfaces.iter().flat_map(|surface| &surface.felt);
+    let felt: BTreeSet<u32> = felt.map(|felt| felt.touch).collect();
+    let lost = (0..presses.len() as u32).filter(|touch| !felt.contains(touch));
+    let pressed = surfaces.iter().map(|surface| {
         let on_face = surface.felt.iter().filter(|felt| felt.at_edge.is_none());
         PressedSurface {
             primitive: surface.primitive,
             presses: on_face.map(|felt| felt.touch).collect(),
         }
     });
-    pressed
-        .filter(|surface| !surface.presses.is_empty())
-        .collect()
+    let pressed = pressed.filter(|surface| !surface.presses.is_empty());
+    (pressed.collect(), lost.collect())
 }
 
 impl PressedSurface {

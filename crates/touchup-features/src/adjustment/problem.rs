@@ -2,95 +2,39 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::{SMatrix, SVector, Vector3};
+use nalgebra::SMatrix;
 
-use super::pressed_surface::{PressedSurface, pressed_surfaces};
-use super::recorded_press::{RecordedPress, SessionNumbers};
+use super::numbers::{NUMBERS, NumberMatrix, NumberVector, SessionNumbers};
+use super::placed_press::PlacedPress;
+use super::pressed_surface::PressedSurface;
+use super::recorded_press::RecordedPress;
+use super::session_change::SessionChange;
 use crate::features::fit::{FREEDOMS, Steps};
 use touchup_geometry::numeric::{SIGMA_OF_MEDIAN, cauchy_weight, median};
 
-/// Number of unknowns of a session: compliance and offset.
-const NUMBERS: usize = 4;
-/// Number of rounds of surfaces found in the presses, as the session is known until then.
-const ROUNDS: usize = 2;
-/// Number of steps of Gauss and Newton.
-const STEPS: usize = 12;
+/// Number of steps of Gauss and Newton, and the usual misfit, m, in the first, half of it in each
+/// next: presses on a surface that moved are not lost before it is found.
+const STEPS: usize = 14;
+const WIDEST: f64 = 8e-3;
 /// Misfit of half weight, in the usual one: Cauchy's for 95 % efficiency.
-const HALF_WEIGHT: f64 = 2.385;
-/// Minimum number of groups of strokes whose scatter shows an uncertainty: twice the unknowns.
-const FEWEST_GROUPS: usize = 2 * NUMBERS;
+pub(super) const HALF_WEIGHT: f64 = 2.385;
+/// Number of unknowns without a change: compliance and offset.
+const UNCHANGING: usize = 4;
 /// Smallest usual misfit, m.
-const LEAST_MISFIT: f64 = 1e-6;
+pub(super) const LEAST_MISFIT: f64 = 1e-6;
 /// Standard deviation of a step of a surface before its presses, m and rad: freedoms that they do
 /// not show stay.
 const LOOSE: f64 = 0.1;
 
-type Numbers = SVector<f64, NUMBERS>;
-type NumberMatrix = SMatrix<f64, NUMBERS, NUMBERS>;
 type SurfaceMatrix = SMatrix<f64, FREEDOMS, FREEDOMS>;
 type CrossMatrix = SMatrix<f64, FREEDOMS, NUMBERS>;
-
-impl SessionNumbers {
-    fn as_vector(&self) -> Numbers {
-        let o = &self.offset_t;
-        Numbers::new(self.compliance, o.x, o.y, o.z)
-    }
-
-    fn from_vector(x: &Numbers) -> Self {
-        Self {
-            compliance: x[0],
-            offset_t: Vector3::new(x[1], x[2], x[3]),
-        }
-    }
-}
-
-/// Numbers of a session as its presses show them.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct SessionAdjustment {
-    pub found: SessionNumbers,
-    /// standard uncertainties: the posterior's
-    pub sigma: SessionNumbers,
-    /// number of presses on surfaces
-    pub presses: usize,
-    /// number of surfaces
-    pub surfaces: usize,
-}
-
-impl SessionAdjustment {
-    /// Adjusts a session; `None` without surfaces in its presses.
-    ///
-    /// - `radius`: of the ball, m. `told`: numbers at the start. `prior`: their standard
-    ///   uncertainties before the presses.
-    pub(crate) fn of(
-        presses: &[RecordedPress],
-        radius: f64,
-        told: SessionNumbers,
-        prior: SessionNumbers,
-    ) -> Option<Self> {
-        let mut found = None;
-        let mut numbers = told;
-        for _ in 0..ROUNDS {
-            let surfaces = pressed_surfaces(presses, radius, &numbers);
-            let adjusted = SessionProblem {
-                presses,
-                radius,
-                told,
-                prior,
-            }
-            .adjusted(surfaces, numbers)?;
-            numbers = adjusted.found;
-            found = Some(adjusted);
-        }
-        found
-    }
-}
 
 /// An observation: a press on a surface.
 struct PressRow {
     /// d(p + R o + κ F) − r, m
     misfit: f64,
     by_surface: Steps,
-    by_numbers: Numbers,
+    by_numbers: NumberVector,
     stroke: u32,
 }
 
@@ -102,6 +46,7 @@ struct SurfaceSums {
 }
 
 /// A session with its presses and priors.
+#[derive(Clone, Copy)]
 pub(super) struct SessionProblem<'a> {
     pub presses: &'a [RecordedPress],
     /// of the ball, m
@@ -109,9 +54,39 @@ pub(super) struct SessionProblem<'a> {
     pub told: SessionNumbers,
     /// standard uncertainties of these
     pub prior: SessionNumbers,
+    pub change: Option<SessionChange>,
+}
+
+/// Numbers and surfaces of least squares.
+pub(super) struct SolvedSession {
+    pub found: SessionNumbers,
+    /// standard uncertainties
+    pub sigma: SessionNumbers,
+    pub surfaces: Vec<PressedSurface>,
+    /// of all presses, m
+    pub misfits: Vec<f64>,
+    /// usual one, m
+    pub scale: f64,
+    /// number of presses that count as one: variance of the numbers in that of independent presses
+    pub alike: f64,
+}
+
+impl SolvedSession {
+    /// Cauchy's cost of all misfits.
+    ///
+    /// - `scale`: usual one, m.
+    pub(super) fn cost(&self, scale: f64) -> f64 {
+        let cost = |misfit: &f64| (misfit / (HALF_WEIGHT * scale)).powi(2).ln_1p();
+        HALF_WEIGHT.powi(2) / 2.0 * self.misfits.iter().map(cost).sum::<f64>()
+    }
 }
 
 impl SessionProblem<'_> {
+    /// One of the presses where it was with these numbers.
+    pub(super) fn placed(&self, at: u32, numbers: &SessionNumbers) -> PlacedPress {
+        self.presses[at as usize].placed(numbers, self.change.as_ref())
+    }
+
     /// Observation of a press.
     fn row(
         &self,
@@ -119,17 +94,13 @@ impl SessionProblem<'_> {
         press: &RecordedPress,
         numbers: &SessionNumbers,
     ) -> PressRow {
-        let (distance, normal, by_surface) = surface.at(&press.placed(numbers));
-        let by_offset = press.rotation.inverse_transform_vector(&normal);
+        let placed = press.placed(numbers, self.change.as_ref());
+        let (distance, normal, by_surface) = surface.at(&placed.centre);
+        let by_numbers = press.by_numbers(&placed, &normal, self.change.as_ref());
         PressRow {
             misfit: distance - self.radius,
             by_surface,
-            by_numbers: Numbers::new(
-                press.force.dot(&normal),
-                by_offset.x,
-                by_offset.y,
-                by_offset.z,
-            ),
+            by_numbers: by_numbers.as_vector(),
             stroke: press.stroke,
         }
     }
@@ -141,30 +112,38 @@ impl SessionProblem<'_> {
             .collect()
     }
 
+    /// Number of unknowns.
+    fn unknowns(&self) -> usize {
+        let of_change = self.change.map_or(0, |change| change.cause.freedoms());
+        UNCHANGING + of_change
+    }
+
     /// The numbers and surfaces of least squares; `None` without any surface, or if rounding leaves
     /// no solution.
-    pub(super) fn adjusted(
+    pub(super) fn solved(
         &self,
         mut surfaces: Vec<PressedSurface>,
         mut numbers: SessionNumbers,
-    ) -> Option<SessionAdjustment> {
-        let presses = surfaces.iter().map(|surface| surface.presses.len()).sum();
-        let count = surfaces.len();
+    ) -> Option<SolvedSession> {
+        let mut width = WIDEST;
         for _ in 0..STEPS {
-            let step = Equations::of(self, &surfaces, &numbers)?;
+            width /= 2.0;
+            let step = SessionEquations::of(self, &surfaces, &numbers, width)?;
             let change = step.reduced.cholesky()?.solve(&step.right);
             numbers = SessionNumbers::from_vector(&(numbers.as_vector() + change));
             for (surface, sums) in surfaces.iter_mut().zip(&step.sums) {
                 surface.move_by(&sums.step(&change)?);
             }
         }
-        let last = Equations::of(self, &surfaces, &numbers)?;
-        let variances = last.variances()?;
-        Some(SessionAdjustment {
+        let last = SessionEquations::of(self, &surfaces, &numbers, 0.0)?;
+        let (variances, alike) = last.variances(self.unknowns())?;
+        Some(SolvedSession {
             found: numbers,
             sigma: SessionNumbers::from_vector(&variances.map(f64::sqrt)),
-            presses,
-            surfaces: count,
+            surfaces,
+            misfits: last.misfits,
+            scale: last.scale,
+            alike,
         })
     }
 }
@@ -188,7 +167,7 @@ impl SurfaceSums {
     }
 
     /// Step of the surface with one of the numbers.
-    fn step(&self, change: &Numbers) -> Option<Steps> {
+    fn step(&self, change: &NumberVector) -> Option<Steps> {
         Some(
             self.information
                 .cholesky()?
@@ -204,32 +183,38 @@ impl PressRow {
 }
 
 /// Linear equations of the numbers, with the surfaces eliminated.
-struct Equations {
+struct SessionEquations {
     sums: Vec<SurfaceSums>,
     /// information of the numbers after elimination: Schur complement
     reduced: NumberMatrix,
-    right: Numbers,
+    right: NumberVector,
     /// scores of strokes, in their order
-    scores: Vec<Numbers>,
+    scores: Vec<NumberVector>,
+    /// of all presses, m, and the usual one
+    misfits: Vec<f64>,
+    scale: f64,
 }
 
-impl Equations {
+impl SessionEquations {
     fn of(
         problem: &SessionProblem,
         surfaces: &[PressedSurface],
         numbers: &SessionNumbers,
+        width: f64,
     ) -> Option<Self> {
         let rows: Vec<Vec<PressRow>> = surfaces
             .iter()
             .map(|surface| problem.rows(surface, numbers))
             .collect();
-        let mut sizes: Vec<f64> = rows.iter().flatten().map(|row| row.misfit.abs()).collect();
-        let scale = (SIGMA_OF_MEDIAN * median(&mut sizes)?).max(LEAST_MISFIT);
+        let misfits: Vec<f64> = rows.iter().flatten().map(|row| row.misfit).collect();
+        let mut sizes: Vec<f64> = misfits.iter().map(|misfit| misfit.abs()).collect();
+        let usual = (SIGMA_OF_MEDIAN * median(&mut sizes)?).max(LEAST_MISFIT);
+        let scale = usual.max(width);
         let prior = problem.prior.as_vector().map(|sigma| 1.0 / (sigma * sigma));
         let off = problem.told.as_vector() - numbers.as_vector();
         let mut reduced = NumberMatrix::from_diagonal(&prior);
-        let mut right: Numbers = prior.component_mul(&off);
-        let mut scores: BTreeMap<u32, Numbers> = BTreeMap::new();
+        let mut right: NumberVector = prior.component_mul(&off);
+        let mut scores: BTreeMap<u32, NumberVector> = BTreeMap::new();
         let mut sums = Vec::new();
         for rows in &rows {
             let of = SurfaceSums::of(rows, scale);
@@ -250,24 +235,34 @@ impl Equations {
             reduced,
             right,
             scores: scores.into_values().collect(),
+            misfits,
+            scale: usual,
         })
     }
 
     /// Variances of the numbers: of independent presses, or of independent groups of strokes,
     /// whichever is largest (batch means: errors that wander slowly are the same in neighbours).
-    fn variances(&self) -> Option<Numbers> {
+    ///
+    /// - `unknowns`: their number.
+    fn variances(&self, unknowns: usize) -> Option<(NumberVector, f64)> {
         let inverse = self.reduced.cholesky()?.inverse();
+        let independent = inverse.diagonal();
         let lengths = (0..).map(|power| 1 << power);
-        let lengths = lengths.take_while(|length| self.scores.len() >= FEWEST_GROUPS * length);
+        // twice the unknowns
+        let fewest = 2 * unknowns;
+        let lengths = lengths.take_while(|length| self.scores.len() >= fewest * length);
         let of_groups = lengths.map(|length: usize| {
             let groups = self.scores.chunks(length);
-            let spare = groups.len() as f64 / (groups.len() - NUMBERS) as f64;
-            let scores = groups.map(|group| inverse * group.iter().sum::<Numbers>());
+            let spare = groups.len() as f64 / (groups.len() - unknowns) as f64;
+            let scores = groups.map(|group| inverse * group.iter().sum::<NumberVector>());
             scores
                 .map(|score| score.component_mul(&score))
-                .sum::<Numbers>()
+                .sum::<NumberVector>()
                 * spare
         });
-        Some(of_groups.fold(inverse.diagonal(), |most, of| most.sup(&of)))
+        let variances = of_groups.fold(independent, |most, of| most.sup(&of));
+        let alike = variances.component_div(&independent);
+        let alike = alike.rows(0, unknowns).mean();
+        Some((variances, alike))
     }
 }

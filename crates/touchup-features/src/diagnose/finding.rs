@@ -21,6 +21,8 @@ names! {
         StampsGoBack = "stamps_go_back",
         /// Poses too far apart in time for interpolation.
         SlowPoses = "slow_poses",
+        /// Poses that are repeated while the stylus moves on.
+        PoseHeld = "pose_held",
         /// The messages yield no sample.
         NoSample = "no_sample",
         /// No force above the noise.
@@ -53,6 +55,10 @@ names! {
         Radius = "radius",
         /// The ball is at another place of the stylus.
         TipOffset = "tip_offset",
+        /// The part moved, or the frame of the poses did, while it was touched.
+        PartMoved = "part_moved",
+        /// The ball changed its place on the stylus.
+        TipBent = "tip_bent",
         /// The stylus bends more or less than its stiffness predicts.
         Stiffness = "stiffness",
         /// Forces clipped at one value.
@@ -76,11 +82,14 @@ impl InputCause {
             | Self::QuaternionOrder => true,
             Self::Stiffness
             | Self::TipOffset
+            | Self::PartMoved
+            | Self::TipBent
             | Self::ZeroStamps
             | Self::TwoEpochs
             | Self::TimeUnit
             | Self::StampsGoBack
             | Self::SlowPoses
+            | Self::PoseHeld
             | Self::Delay
             | Self::NoSample
             | Self::NoContact
@@ -103,8 +112,27 @@ pub struct InputFinding {
     pub is_sure: bool,
     /// measurement, with units
     pub measured: String,
+    /// numbers that it is about
+    pub numbers: Vec<FoundNumber>,
     /// remedy
     pub remedy: &'static str,
+}
+
+/// A number of a finding.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FoundNumber {
+    /// with its unit
+    pub name: &'static str,
+    /// in that unit
+    pub value: f64,
+    /// standard uncertainty
+    pub sigma: f64,
+}
+
+impl FoundNumber {
+    pub(super) fn new(name: &'static str, value: f64, sigma: f64) -> Self {
+        Self { name, value, sigma }
+    }
 }
 
 impl InputFinding {
@@ -118,8 +146,18 @@ impl InputFinding {
             cause,
             is_sure,
             measured,
+            numbers: Vec::new(),
             remedy,
         }
+    }
+
+    /// Whether something changed while the session lasted.
+    pub(super) fn is_of_change(&self) -> bool {
+        matches!(self.cause, InputCause::PartMoved | InputCause::TipBent)
+    }
+
+    pub(super) fn with(self, numbers: Vec<FoundNumber>) -> Self {
+        Self { numbers, ..self }
     }
 }
 

@@ -1,6 +1,6 @@
 //! Samples kept by the monitor, in bounded memory.
 
-use nalgebra::{Point3, UnitQuaternion, Vector3};
+use nalgebra::{Point3, Quaternion, UnitQuaternion, Vector3, Vector4};
 
 /// One kept sample.
 #[derive(Clone, Copy, Debug)]
@@ -57,5 +57,80 @@ impl<const MOST: usize> ThinnedRecords<MOST> {
         }
         self.seen += 1;
         number
+    }
+}
+
+/// Longest duration of samples in one mean, ns.
+const LONGEST_MEAN_NS: i64 = 100_000_000;
+/// Longest way of the ball in one mean, in its radii.
+const MEAN_WAY: f64 = 0.35;
+/// Minimum cosine between its forces.
+const MEAN_LEAN: f64 = 0.94;
+
+/// Means of samples at one place: a tracker's noise from sample to sample goes down.
+#[derive(Clone, Debug)]
+pub(super) struct RecordMean {
+    /// longest way, m
+    way: f64,
+    first: Option<InputRecord>,
+    count: f64,
+    /// mean time since the first, ns
+    since_ns: f64,
+    centre: Vector3<f64>,
+    force: Vector3<f64>,
+    turn: Vector4<f64>,
+}
+
+impl RecordMean {
+    /// - `radius`: of the ball, m.
+    pub(crate) fn new(radius: f64) -> Self {
+        Self {
+            way: MEAN_WAY * radius,
+            first: None,
+            count: 0.0,
+            since_ns: 0.0,
+            centre: Vector3::zeros(),
+            force: Vector3::zeros(),
+            turn: Vector4::zeros(),
+        }
+    }
+
+    /// Takes a sample; returns the mean of those before it, if it is at another place.
+    pub(crate) fn push(&mut self, record: InputRecord) -> Option<InputRecord> {
+        let is_near = |first: &InputRecord| {
+            record.stamp_ns.saturating_sub(first.stamp_ns) < LONGEST_MEAN_NS
+                && (record.centre - first.centre).norm() <= self.way
+                && record.force_o.dot(&first.force_o)
+                    > MEAN_LEAN * record.force_o.norm() * first.force_o.norm()
+        };
+        let is_near = self.first.as_ref().is_some_and(is_near);
+        let done = if is_near { None } else { self.mean() };
+        if !is_near {
+            *self = Self {
+                first: Some(record),
+                ..Self::new(self.way / MEAN_WAY)
+            };
+        }
+        let first = self.first.unwrap_or(record);
+        let turn = record.rotation.coords;
+        let side = turn.dot(&first.rotation.coords).signum();
+        self.count += 1.0;
+        self.since_ns += record.stamp_ns.saturating_sub(first.stamp_ns) as f64;
+        self.centre += record.centre - first.centre;
+        self.force += record.force_o;
+        self.turn += turn * side;
+        done
+    }
+
+    /// Of the samples since the last change of place.
+    pub(crate) fn mean(&self) -> Option<InputRecord> {
+        let first = self.first?;
+        let turn = Quaternion::from_vector(self.turn);
+        Some(InputRecord {
+            stamp_ns: first.stamp_ns + (self.since_ns / self.count) as i64,
+            centre: first.centre + self.centre / self.count,
+            rotation: UnitQuaternion::new_normalize(turn),
+            force_o: self.force / self.count,
+        })
     }
 }

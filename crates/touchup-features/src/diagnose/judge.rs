@@ -118,9 +118,9 @@ impl InputJudge<'_> {
             Err(untouched) => return untouched,
         };
         let mut findings = Vec::new();
+        let few = self.few_places(&presses);
         self.judge_forces(&presses, resting, &mut findings);
         findings.extend(self.judge_steps(&presses.levels));
-        let few = self.few_places(&presses);
         let place = self.judge_places(&presses, few.is_some());
         let is_placed = place.as_ref().is_none_or(|(_, is_placed)| *is_placed);
         findings.extend(place.map(|(finding, _)| finding));
@@ -133,12 +133,25 @@ impl InputJudge<'_> {
             return findings;
         }
         // turned forces select other presses, and show other surfaces
-        let is_read = wrench.is_none() && !is_doubted_place;
-        let mut of_session = if is_read {
+        let is_read = wrench.is_none();
+        let is_first =
+            |finding: &InputFinding| finding.is_sure && finding.cause != InputCause::Frame;
+        let mut of_session = if is_read && !findings.iter().any(is_first) {
             self.judge_session(&presses)
         } else {
             Vec::new()
         };
+        // contacts of two places are on no scan
+        if of_session.iter().any(InputFinding::is_of_change) {
+            let clock = self.judge_clock().filter(|finding| finding.is_sure);
+            findings.retain(|finding| !is_of_poses(finding));
+            findings.extend(clock.map_or(of_session, |clock| vec![clock]));
+            return findings;
+        }
+        let is_read = is_read && !is_doubted_place;
+        if !is_read {
+            of_session.clear();
+        }
         // a ball at another place looks like a scan at another one
         let registration = (is_read && of_session.is_empty())
             .then(|| self.judge_registration(&presses))
@@ -276,11 +289,8 @@ impl InputJudge<'_> {
         let is_unit = findings
             .iter()
             .any(|finding| finding.cause == InputCause::ForceUnit);
-        findings.extend(
-            resting
-                .filter(|_| !is_unit)
-                .and_then(|count| self.judge_rest(levels, count)),
-        );
+        let rest = || resting.and_then(|count| self.judge_rest(levels, count));
+        findings.extend((!is_unit).then(rest).flatten());
         findings.extend(self.judge_saturation(levels));
     }
 

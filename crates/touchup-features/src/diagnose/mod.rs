@@ -15,12 +15,13 @@ mod monitor;
 mod monitor_params;
 mod placed;
 mod places;
+mod pose_course;
 mod registration;
 mod session;
 mod shift;
 mod stamps;
 mod wrench;
 
-pub use finding::{InputCause, InputFinding};
+pub use finding::{FoundNumber, InputCause, InputFinding};
 pub use monitor::InputMonitor;
 pub use monitor_params::InputMonitorParams;

@@ -3,9 +3,10 @@
 use nalgebra::Vector3;
 
 use super::finding::{InputCause, InputFinding};
-use super::input_record::{InputRecord, ThinnedRecords};
+use super::input_record::{InputRecord, RecordMean, ThinnedRecords};
 use super::judge::{FEWEST_PRESSES, InputJudge};
 use super::monitor_params::InputMonitorParams;
+use super::pose_course::PoseCourse;
 use super::stamps::InputStamps;
 use touchup_geometry::mesh::{FaceTree, TriMesh};
 use touchup_geometry::numeric::median;
@@ -17,7 +18,7 @@ use touchup_method::stylus::{
 /// Maximum number of kept samples: of 60 s at 1 kHz one in sixteen.
 const MOST_RECORDS: usize = 4096;
 /// Maximum number of kept presses: surfaces need neighbours on them.
-const MOST_PRESSES: usize = 16384;
+const MOST_PRESSES: usize = 8192;
 /// Maximum number of force steps for the noise estimate.
 const MOST_STEPS: usize = 4096;
 /// Median length of a vector of three standard normal components.
@@ -29,9 +30,11 @@ pub struct InputMonitor {
     params: InputMonitorParams,
     compensator: Compensator,
     stamps: InputStamps,
+    poses: PoseCourse,
     clock: ClockEstimator,
     records: ThinnedRecords<MOST_RECORDS>,
-    /// those with a force above the contact threshold
+    /// samples with a force above the contact threshold at the last place, and the means before
+    press: RecordMean,
     presses: ThinnedRecords<MOST_PRESSES>,
     samples: u64,
     last_force: Option<Vector3<f64>>,
@@ -100,7 +103,9 @@ impl InputMonitor {
             clock: ClockEstimator::new(params.tip.stiffness)?,
             params,
             stamps: InputStamps::default(),
+            poses: PoseCourse::default(),
             records: ThinnedRecords::default(),
+            press: RecordMean::new(params.tip.radius),
             presses: ThinnedRecords::default(),
             samples: 0,
             last_force: None,
@@ -123,6 +128,8 @@ impl InputMonitor {
 
     /// Takes a sample made from the messages.
     pub fn sample(&mut self, sample: &Sample) {
+        self.poses
+            .push(sample.stamp_ns, sample.pose_ot.translation.vector);
         let force = sample.wrench.force;
         let size = force.amax();
         if size > self.largest.0 {
@@ -141,8 +148,10 @@ impl InputMonitor {
             force_o: tip.force_o,
         };
         let on = self.params.gate.map_or(0.0, |gate| gate.on);
-        if tip.force_o.norm_squared() > on * on {
-            self.presses.push(record);
+        if tip.force_o.norm_squared() > on * on
+            && let Some(mean) = self.press.push(record())
+        {
+            self.presses.push(|| mean);
         }
         if let Some(number) = self.records.push(record)
             && let Some(last) = self.last_force
@@ -204,12 +213,14 @@ impl InputMonitor {
         }
         let noise =
             median(&mut self.steps.clone()).unwrap_or(0.0) / (MEDIAN_OF_THREE * 2f64.sqrt());
+        let last = self.press.mean();
+        let pressing: Vec<InputRecord> = self.presses.kept.iter().copied().chain(last).collect();
         let judge = InputJudge {
             params: &self.params,
             scan,
             tree,
             records: &self.records.kept,
-            pressing: &self.presses.kept,
+            pressing: &pressing,
             noise,
             force_step: self
                 .changes
@@ -218,6 +229,7 @@ impl InputMonitor {
             largest: (self.largest.0, self.largest.1, self.samples),
             clock: self.clock_offset(),
         };
+        findings.extend(self.poses.finding());
         findings.extend(judge.findings());
         findings.sort_by_key(|finding| (!finding.is_sure, finding.cause as usize));
         findings

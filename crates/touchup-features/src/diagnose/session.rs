@@ -1,10 +1,13 @@
-//! Stiffness and place of the ball: told against what the presses show among themselves.
+//! What a session is made with, and what changed while it lasted: told against what the presses
+//! show among themselves.
 
-use nalgebra::Vector3;
+use nalgebra::{Vector3, Vector6};
 
-use super::finding::{InputCause, InputFinding};
+use super::finding::{FoundNumber, InputCause, InputFinding};
 use super::judge::{InputJudge, Presses};
-use crate::adjustment::{RecordedPress, SessionAdjustment, SessionNumbers};
+use crate::adjustment::{
+    ChangeCause, ChangeCourse, LikelyChange, RecordedPress, SessionAdjustment, SessionNumbers,
+};
 use touchup_method::stylus::{TipParams, TipShape};
 
 /// Longest pause within a stroke, ns, and its longest duration, in which presses share their errors:
@@ -15,14 +18,27 @@ const LONGEST_STROKE_NS: i64 = 1_000_000_000;
 const ANY: SessionNumbers = SessionNumbers {
     compliance: 1e-3,
     offset_t: Vector3::new(10e-3, 10e-3, 10e-3),
+    change: Vector6::new(10e-3, 10e-3, 10e-3, 0.2, 0.2, 0.2),
 };
-/// Standard uncertainty of the sink under the largest force, and of the place of the ball, besides
-/// the scatter of strokes, m: what friction and lateral bend of a stylus look like.
+/// Standard uncertainty of the sink under the largest force, and of places, besides the scatter of
+/// strokes, m: what friction and lateral bend of a stylus look like.
 const OF_MODEL: f64 = 0.02e-3;
 /// Minimum difference of told and found in standard uncertainties, for a doubt and for a sure
 /// finding.
 const DOUBTED_SIGMAS: f64 = 4.0;
 const SURE_SIGMAS: f64 = 6.0;
+/// Minimum natural logarithm of the odds against the next likely cause, and against none.
+const CLEAR_ODDS: f64 = 5.0;
+
+/// Units of force that are read as N, N, and largest uncertainty of a sink that shows one, as a share
+/// of it.
+const FORCE_UNITS: [(&str, f64); 4] = [
+    ("lbf", 4.448_222),
+    ("kgf", 9.806_65),
+    ("ozf", 0.278_013_9),
+    ("gf", 9.806_65e-3),
+];
+const UNIT_SHARE: f64 = 0.2;
 
 impl InputJudge<'_> {
     /// Numbers of the session that its presses contradict.
@@ -33,15 +49,26 @@ impl InputJudge<'_> {
         }
         let told = SessionNumbers {
             compliance: stiffness.map_or(0.0, f64::recip),
-            offset_t: Vector3::zeros(),
+            ..SessionNumbers::default()
         };
         let recorded = self.recorded_presses(presses);
         let Some(mut adjusted) = SessionAdjustment::of(&recorded, radius, told, ANY) else {
             return Vec::new();
         };
+        let extent = presses.scale.extent;
         let sigma = &mut adjusted.sigma;
         sigma.compliance = sigma.compliance.hypot(OF_MODEL / presses.levels.largest);
         sigma.offset_t.apply(|sigma| *sigma = sigma.hypot(OF_MODEL));
+        for (at, sigma) in sigma.change.iter_mut().enumerate() {
+            let of_model = if at < 3 { OF_MODEL } else { OF_MODEL / extent };
+            *sigma = sigma.hypot(of_model);
+        }
+        let change = adjusted
+            .change
+            .and_then(|change| self.change_finding(&adjusted, &change));
+        if let Some(change) = change {
+            return vec![change];
+        }
         let stiffness = stiffness_finding(&adjusted, told.compliance, self.params.stiffness_share);
         let place = place_finding(&adjusted, self.params.place_sigma);
         stiffness.into_iter().chain(place).collect()
@@ -64,6 +91,7 @@ impl InputJudge<'_> {
                 }
                 last = now;
                 RecordedPress {
+                    stamp_ns: now,
                     centre: record.centre,
                     rotation: record.rotation,
                     force: levels.force_o(record),
@@ -71,6 +99,146 @@ impl InputJudge<'_> {
                 }
             })
             .collect()
+    }
+
+    /// A part that moved, or a ball that changed its place.
+    fn change_finding(
+        &self,
+        adjusted: &SessionAdjustment,
+        likely: &LikelyChange,
+    ) -> Option<InputFinding> {
+        let cause = likely.change.cause;
+        let [shift, turn] =
+            [(0, 1e3, "mm"), (3, 1f64.to_degrees(), "°")].map(|(from, unit, name)| {
+                [0, 1, 2]
+                    .map(|axis| SizeFound {
+                        value: adjusted.found.change[from + axis] * unit,
+                        sigma: adjusted.sigma.change[from + axis] * unit,
+                        known: adjusted.sigma.change[from + axis] < 0.5 * ANY.change[from + axis],
+                    })
+                    .in_words(name)
+            });
+        let sizes = adjusted.found.change.iter().zip(&adjusted.sigma.change);
+        let off = sizes.take(cause.freedoms());
+        let off = off
+            .map(|(size, sigma)| size.abs() / sigma)
+            .fold(0.0, f64::max);
+        let when = self.course_in_words(likely.change.course);
+        let about = likely.change.about * 1e3;
+        let turned = format!(
+            ", turned by {turn} about ({:.1}, {:.1}, {:.1}) mm",
+            about.x, about.y, about.z
+        );
+        let turned = if cause == ChangeCause::PartMoved {
+            &turned
+        } else {
+            ""
+        };
+        let (cause, what, remedy) = match cause {
+            ChangeCause::PartShifted | ChangeCause::PartMoved => (
+                InputCause::PartMoved,
+                format!("{when} the part lies {shift} further{turned}"),
+                "clamp the part, see that the tracker does not start again, and record it again",
+            ),
+            ChangeCause::TipBent => (
+                InputCause::TipBent,
+                format!("{when} the ball is {shift} from where it was, in the axes of the stylus"),
+                "measure the tip again (touchup calibrate tip), and record the part again",
+            ),
+        };
+        let measured = format!(
+            "{what}: {} presses on {} surfaces agree then",
+            adjusted.presses, adjusted.surfaces
+        );
+        let is_possible = off > DOUBTED_SIGMAS && likely.odds > CLEAR_ODDS;
+        let is_sure = off > SURE_SIGMAS;
+        is_possible.then(|| {
+            let numbers = self.change_numbers(adjusted, likely);
+            InputFinding::new(cause, is_sure, measured, remedy).with(numbers)
+        })
+    }
+
+    fn since_first(&self, stamp_ns: i64) -> f64 {
+        let first = self
+            .records
+            .first()
+            .map_or(stamp_ns, |record| record.stamp_ns);
+        stamp_ns.saturating_sub(first) as f64 * 1e-9
+    }
+
+    fn course_in_words(&self, course: ChangeCourse) -> String {
+        match course {
+            ChangeCourse::At(at) => format!("from {:.1} s on", self.since_first(at)),
+            ChangeCourse::Between(from, to) => format!(
+                "slowly, from {:.1} to {:.1} s,",
+                self.since_first(from),
+                self.since_first(to)
+            ),
+        }
+    }
+
+    fn change_numbers(
+        &self,
+        adjusted: &SessionAdjustment,
+        likely: &LikelyChange,
+    ) -> Vec<FoundNumber> {
+        let cause = likely.change.cause;
+        let names = if cause.is_of_part() {
+            [
+                "shift_x_mm",
+                "shift_y_mm",
+                "shift_z_mm",
+                "turn_x_deg",
+                "turn_y_deg",
+                "turn_z_deg",
+            ]
+        } else {
+            ["bend_x_mm", "bend_y_mm", "bend_z_mm", "", "", ""]
+        };
+        let sizes = adjusted.found.change.iter().zip(&adjusted.sigma.change);
+        let sizes = names
+            .into_iter()
+            .zip(sizes)
+            .enumerate()
+            .take(cause.freedoms());
+        let sizes = sizes.map(|(at, (name, (value, sigma)))| {
+            let unit = if at < 3 { 1e3 } else { 1f64.to_degrees() };
+            FoundNumber::new(name, value * unit, sigma * unit)
+        });
+        let about = ["about_x_mm", "about_y_mm", "about_z_mm"]
+            .into_iter()
+            .zip(&likely.change.about.coords);
+        let about = about.map(|(name, value)| FoundNumber::new(name, value * 1e3, 0.0));
+        let at = match likely.change.course {
+            ChangeCourse::At(at) => Some(FoundNumber::new("at_s", self.since_first(at), 0.0)),
+            ChangeCourse::Between(..) => None,
+        };
+        sizes.chain(about).chain(at).collect()
+    }
+}
+
+/// A size along one axis.
+struct SizeFound {
+    value: f64,
+    sigma: f64,
+    /// the presses determine it
+    known: bool,
+}
+
+trait InWords {
+    fn in_words(&self, unit: &str) -> String;
+}
+
+impl InWords for [SizeFound; 3] {
+    fn in_words(&self, unit: &str) -> String {
+        let words = self.each_ref().map(|of| {
+            if of.known {
+                format!("{:.2} ± {:.2}", of.value, of.sigma)
+            } else {
+                "unknown".to_owned()
+            }
+        });
+        format!("({}) {unit}", words.join(", "))
     }
 }
 
@@ -83,9 +251,15 @@ fn stiffness_finding(
     let (found, sigma) = (adjusted.found.compliance, adjusted.sigma.compliance);
     // a ball that rises under force has another cause
     let is_possible = found > -DOUBTED_SIGMAS * sigma;
-    let off = (found - told).abs() / sigma.hypot(of_told * told);
+    let off = (found.max(0.0) - told).abs() / sigma.hypot(of_told * told);
+    let unit = FORCE_UNITS.iter().find(|(_, unit)| {
+        (found / unit - told).abs() < 3.0 * sigma / unit && sigma < UNIT_SHARE * found
+    });
+    let unit = unit.map_or_else(String::new, |(name, _)| {
+        format!(", as forces in {name} would have it")
+    });
     let measured = format!(
-        "{} presses on {} surfaces agree if the ball sinks by {:.4} ± {:.4} mm/N, and by its stiffness it sinks by {:.4} mm/N",
+        "{} presses on {} surfaces agree if the ball sinks by {:.4} ± {:.4} mm/N, and by its stiffness it sinks by {:.4} mm/N{unit}",
         adjusted.presses,
         adjusted.surfaces,
         found * 1e3,
@@ -93,8 +267,11 @@ fn stiffness_finding(
         told * 1e3
     );
     let remedy = "give the stiffness in N/mm (--stiffness-n-per-mm, tip.stiffness_n_per_mm; touchup calibrate tip)";
-    (is_possible && off > DOUBTED_SIGMAS)
-        .then(|| InputFinding::new(InputCause::Stiffness, off > SURE_SIGMAS, measured, remedy))
+    (is_possible && off > DOUBTED_SIGMAS).then(|| {
+        let number = FoundNumber::new("compliance_mm_per_n", found * 1e3, sigma * 1e3);
+        InputFinding::new(InputCause::Stiffness, off > SURE_SIGMAS, measured, remedy)
+            .with(vec![number])
+    })
 }
 
 /// - `of_told`: standard uncertainty of the told place along each axis, m.
@@ -108,6 +285,12 @@ fn place_finding(adjusted: &SessionAdjustment, of_told: f64) -> Option<InputFind
         adjusted.presses, adjusted.surfaces
     );
     let remedy = "add that to tip.offset_mm (touchup calibrate tip)";
-    (off > DOUBTED_SIGMAS)
-        .then(|| InputFinding::new(InputCause::TipOffset, off > SURE_SIGMAS, measured, remedy))
+    (off > DOUBTED_SIGMAS).then(|| {
+        let names = ["offset_x_mm", "offset_y_mm", "offset_z_mm"].into_iter();
+        let numbers = names
+            .zip(found.iter().zip(sigma))
+            .map(|(name, (found, sigma))| FoundNumber::new(name, found * 1e3, sigma * 1e3));
+        InputFinding::new(InputCause::TipOffset, off > SURE_SIGMAS, measured, remedy)
+            .with(numbers.collect())
+    })
 }
