@@ -12,6 +12,7 @@ fn finding(cause: InputCause, is_sure: bool) -> InputFinding {
         cause,
         is_sure,
         measured: "measured".to_owned(),
+        numbers: Vec::new(),
         remedy: "do",
     }
 }
