@@ -74,7 +74,8 @@ def stiffness_changed(recording, size):
     true = recording.facts["meta"]["tip_stiffness_N_per_mm"]
     further = since(recording.pose.time_s, recording, 0.5)[:, None] * (size - 1) / true
     place = recording.place_mm() - further * recording.force_of_part()
-    return Changed(recording.with_place(place), f"at 50 % the stylus gets softer by a factor of {size}")
+    number = {"compliance_more_mm_per_n": (size - 1) / true, "at_s": 0.5 * recording.facts["duration_s"]}
+    return Changed(recording.with_place(place), f"at 50 % the stylus gets softer by a factor of {size}", number)
 
 
 def scan_placed(recording, size, along=(0, 0, 0), about=(0, 0, 0)):

@@ -10,7 +10,7 @@ use touchup_geometry::numeric::mean;
 
 /// Number of parts of a session between times of a change that are tried first, and number of parts
 /// of the time between two of these that are tried next, again and again.
-const PARTS: usize = 16;
+pub(super) const CHANGE_PARTS: usize = 16;
 const FINER: usize = 8;
 
 /// A change, and the session with it.
@@ -78,48 +78,70 @@ impl<'a> ChangeSearch<'a> {
     fn fit(&self, change: Option<SessionChange>, solved: &SolvedSession) -> ChangeFit {
         let count = solved.misfits.len() as f64 / self.alike;
         // its size and its time
-        let freedoms = change.map_or(0, |change| change.cause.freedoms() + 1) as f64;
+        let freedoms = change.map_or(0, |change| change.cause.freedoms() + 1);
         ChangeFit {
             change,
             numbers: solved.found,
-            likelihood: -solved.cost(self.scale) / self.alike
-                - freedoms / 2.0 * count.max(1.0).ln(),
+            likelihood: -solved.cost(self.scale) / self.alike - price(freedoms, count),
         }
     }
 
     /// A change at the likeliest time around its own.
     fn likeliest_time(&self, fit: ChangeFit) -> ChangeFit {
         let presses = self.problem.presses;
-        let mut width = presses.len() / PARTS;
-        let mut best = fit;
-        while let Some(SessionChange {
+        let Some(SessionChange {
             course: ChangeCourse::At(at),
             cause,
             about,
-        }) = best.change
-            && width > 0
-        {
-            let middle = presses.partition_point(|press| press.stamp_ns < at);
-            let finer = width.div_ceil(FINER);
-            let times = (middle.saturating_sub(width)..middle + width).step_by(finer);
-            let times = times.filter(|&time| time > 0 && time < presses.len());
-            let change = |time: usize| SessionChange {
+        }) = fit.change
+        else {
+            return fit;
+        };
+        let from = presses.partition_point(|press| press.stamp_ns < at);
+        let at_time = |time: usize| {
+            let change = SessionChange {
                 cause,
                 course: ChangeCourse::At(presses[time].stamp_ns),
                 about,
             };
-            for change in times.map(change) {
-                if let Some(solved) = solved(&self.problem, self.surfaces, Some(change)) {
-                    let fit = self.fit(Some(change), &solved);
-                    if fit.likelihood > best.likelihood {
-                        best = fit;
-                    }
-                }
-            }
-            width = if finer > 1 { finer } else { 0 };
-        }
-        best
+            let solved = solved(&self.problem, self.surfaces, Some(change))?;
+            Some(self.fit(Some(change), &solved))
+        };
+        let likeliest = likeliest_time(presses.len(), from, at_time, &|fit| fit.likelihood);
+        likeliest.unwrap_or(fit)
     }
+}
+
+/// The likeliest of fits at times around one, in ever finer steps.
+///
+/// - `count`: of presses. `from`: number of the press at that time. `fit`: with a change at a press.
+pub(super) fn likeliest_time<T>(
+    count: usize,
+    from: usize,
+    fit: impl Fn(usize) -> Option<T>,
+    likelihood: &dyn Fn(&T) -> f64,
+) -> Option<T> {
+    let mut width = count / CHANGE_PARTS;
+    let mut best = (from, fit(from)?);
+    while width > 0 {
+        let finer = width.div_ceil(FINER);
+        let times = (best.0.saturating_sub(width)..best.0 + width).step_by(finer);
+        for time in times.filter(|&time| time > 0 && time < count) {
+            if let Some(other) = fit(time)
+                && likelihood(&other) > likelihood(&best.1)
+            {
+                best = (time, other);
+            }
+        }
+        width = if finer > 1 { finer } else { 0 };
+    }
+    Some(best.1)
+}
+
+/// Price of unknowns in natural logarithms of the likelihood: half of the logarithm of the number of
+/// observations for each.
+pub(super) fn price(unknowns: usize, observations: f64) -> f64 {
+    unknowns as f64 / 2.0 * observations.max(1.0).ln()
 }
 
 fn solved(
@@ -135,13 +157,14 @@ fn changes(problem: &SessionProblem) -> impl Iterator<Item = SessionChange> {
     let presses = problem.presses;
     let about = Point3::from(mean(presses.iter().map(|press| press.centre.coords)));
     let stamp = |at: usize| presses[at.min(presses.len() - 1)].stamp_ns;
-    let at = |part: usize| ChangeCourse::At(stamp(part * presses.len() / PARTS));
+    let at = |part: usize| ChangeCourse::At(stamp(part * presses.len() / CHANGE_PARTS));
     let drift = ChangeCourse::Between(stamp(0), stamp(presses.len()));
-    let courses: Vec<ChangeCourse> = (1..PARTS).map(at).chain([drift]).collect();
+    let courses: Vec<ChangeCourse> = (1..CHANGE_PARTS).map(at).chain([drift]).collect();
     let causes = [
         ChangeCause::PartShifted,
         ChangeCause::PartMoved,
         ChangeCause::TipBent,
+        ChangeCause::StiffnessChanged,
     ];
     causes.into_iter().flat_map(move |cause| {
         let change = move |course| SessionChange {

@@ -15,8 +15,14 @@
 //! touched before and after show it. Each such change at each of some times is one more set of
 //! unknowns, and the alternatives compete by their likelihood, each with a price for its unknowns
 //! (Schwarz 1978).
+//!
+//! The forces of presses that slide over these surfaces show the sensor: what turns them, their
+//! gains, their zero and a weight in them.
 
 mod along_time;
+mod force_adjustment;
+mod force_fault;
+mod grouped_scores;
 mod merged;
 mod numbers;
 mod placed_press;
@@ -26,10 +32,14 @@ mod recorded_press;
 mod session_adjustment;
 mod session_change;
 
+pub(crate) use force_adjustment::ForceAdjustment;
+pub(crate) use force_fault::{ForceFault, without_trace};
 pub(crate) use numbers::SessionNumbers;
 pub(crate) use recorded_press::RecordedPress;
 pub(crate) use session_adjustment::{LikelyChange, SessionAdjustment};
 pub(crate) use session_change::{ChangeCause, ChangeCourse};
 
+#[cfg(test)]
+mod force_tests;
 #[cfg(test)]
 mod tests;

@@ -4,13 +4,14 @@ use std::collections::BTreeMap;
 
 use nalgebra::SMatrix;
 
+use super::grouped_scores::GroupedScores;
 use super::numbers::{NUMBERS, NumberMatrix, NumberVector, SessionNumbers};
 use super::placed_press::PlacedPress;
 use super::pressed_surface::PressedSurface;
 use super::recorded_press::RecordedPress;
 use super::session_change::SessionChange;
 use crate::features::fit::{FREEDOMS, Steps};
-use touchup_geometry::numeric::{SIGMA_OF_MEDIAN, cauchy_weight, median};
+use touchup_geometry::numeric::{SIGMA_OF_MEDIAN, cauchy_cost, cauchy_weight, median};
 
 /// Number of steps of Gauss and Newton, and the usual misfit, m, in the first, half of it in each
 /// next: presses on a surface that moved are not lost before it is found.
@@ -76,8 +77,7 @@ impl SolvedSession {
     ///
     /// - `scale`: usual one, m.
     pub(super) fn cost(&self, scale: f64) -> f64 {
-        let cost = |misfit: &f64| (misfit / (HALF_WEIGHT * scale)).powi(2).ln_1p();
-        HALF_WEIGHT.powi(2) / 2.0 * self.misfits.iter().map(cost).sum::<f64>()
+        HALF_WEIGHT.powi(2) * cauchy_cost(&self.misfits, HALF_WEIGHT * scale)
     }
 }
 
@@ -136,7 +136,11 @@ impl SessionProblem<'_> {
             }
         }
         let last = SessionEquations::of(self, &surfaces, &numbers, 0.0)?;
-        let (variances, alike) = last.variances(self.unknowns())?;
+        let grouped = GroupedScores {
+            information: last.reduced,
+            scores: last.scores,
+        };
+        let (variances, alike) = grouped.variances(self.unknowns())?;
         Some(SolvedSession {
             found: numbers,
             sigma: SessionNumbers::from_vector(&variances.map(f64::sqrt)),
@@ -238,31 +242,5 @@ impl SessionEquations {
             misfits,
             scale: usual,
         })
-    }
-
-    /// Variances of the numbers: of independent presses, or of independent groups of strokes,
-    /// whichever is largest (batch means: errors that wander slowly are the same in neighbours).
-    ///
-    /// - `unknowns`: their number.
-    fn variances(&self, unknowns: usize) -> Option<(NumberVector, f64)> {
-        let inverse = self.reduced.cholesky()?.inverse();
-        let independent = inverse.diagonal();
-        let lengths = (0..).map(|power| 1 << power);
-        // twice the unknowns
-        let fewest = 2 * unknowns;
-        let lengths = lengths.take_while(|length| self.scores.len() >= fewest * length);
-        let of_groups = lengths.map(|length: usize| {
-            let groups = self.scores.chunks(length);
-            let spare = groups.len() as f64 / (groups.len() - unknowns) as f64;
-            let scores = groups.map(|group| inverse * group.iter().sum::<NumberVector>());
-            scores
-                .map(|score| score.component_mul(&score))
-                .sum::<NumberVector>()
-                * spare
-        });
-        let variances = of_groups.fold(independent, |most, of| most.sup(&of));
-        let alike = variances.component_div(&independent);
-        let alike = alike.rows(0, unknowns).mean();
-        Some((variances, alike))
     }
 }

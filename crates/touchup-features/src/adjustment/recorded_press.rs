@@ -12,6 +12,8 @@ pub(crate) struct RecordedPress {
     pub rotation: UnitQuaternion<f64>,
     /// force of the part on the ball, N, in O
     pub force: Vector3<f64>,
+    /// way of the ball around it, m, in O; 0 if unknown
+    pub course: Vector3<f64>,
     /// number of its stroke: presses of one share their errors
     pub stroke: u32,
 }

@@ -1,12 +1,15 @@
 //! The adjustment of a whole session.
 
+use std::collections::BTreeMap;
+
 use super::along_time::{ChangeFit, ChangeSearch};
+use super::force_adjustment::{ForceAdjustment, SlidingPress};
 use super::merged::merged;
 use super::numbers::SessionNumbers;
 use super::pressed_surface::{PressedSurface, pressed_surfaces};
 use super::problem::{SessionProblem, SolvedSession};
 use super::recorded_press::RecordedPress;
-use super::session_change::{ChangeCause, SessionChange};
+use super::session_change::SessionChange;
 
 /// Number of rounds of surfaces found in the presses, as the session is known until then.
 const ROUNDS: usize = 2;
@@ -19,6 +22,8 @@ pub(crate) struct SessionAdjustment {
     pub sigma: SessionNumbers,
     /// what changed while it lasted
     pub change: Option<LikelyChange>,
+    /// what is wrong with the forces
+    pub force: Option<ForceAdjustment>,
     /// number of presses on surfaces
     pub presses: usize,
     /// number of surfaces
@@ -68,10 +73,12 @@ impl SessionAdjustment {
             numbers = problem.solved(surfaces, numbers)?.found;
         }
         let solved = solution(&problem, numbers)?;
+        let sliding = sliding_presses(&problem, &solved);
         Some(Self {
             found: solved.found,
             sigma: solved.sigma,
             change: LikelyChange::of(&fits, problem.change),
+            force: ForceAdjustment::of(&sliding),
             presses: solved.misfits.len(),
             surfaces: solved.surfaces.len(),
         })
@@ -92,13 +99,29 @@ fn solution(problem: &SessionProblem, numbers: SessionNumbers) -> Option<SolvedS
     problem.solved(surfaces, numbers)
 }
 
+/// All presses that slide along the surface that they are on, in their order.
+fn sliding_presses(problem: &SessionProblem, solved: &SolvedSession) -> Vec<SlidingPress> {
+    let on_surface = solved.surfaces.iter().flat_map(|surface| {
+        let presses = surface.presses.iter();
+        presses.map(move |&at| (at, surface))
+    });
+    let on_surface: BTreeMap<u32, &PressedSurface> = on_surface.collect();
+    let sliding = on_surface.into_iter().filter_map(|(at, surface)| {
+        let placed = problem.placed(at, &solved.found);
+        let (_, normal, _) = surface.at(&placed.centre);
+        let recorded = placed.turn.inverse_transform_vector(&normal);
+        SlidingPress::of(&problem.presses[at as usize], &recorded)
+    });
+    sliding.collect()
+}
+
 impl LikelyChange {
     /// - `fits`: the likeliest first. `change`: the first of them at its likeliest time.
     fn of(fits: &[ChangeFit], change: Option<SessionChange>) -> Option<Self> {
-        let cause = |fit: &ChangeFit| fit.change.map(|change| change.cause);
-        let of_part = |fit: &ChangeFit| cause(fit).map(ChangeCause::is_of_part);
         let best = fits.first()?;
-        let other = fits.iter().find(|fit| of_part(fit) != of_part(best))?;
+        let cause = best.change?.cause;
+        let is_like = |fit: &ChangeFit| fit.change.is_some_and(|other| cause.is_like(other.cause));
+        let other = fits.iter().find(|fit| !is_like(fit))?;
         Some(Self {
             change: change?,
             odds: best.likelihood - other.likelihood,

@@ -13,6 +13,8 @@ pub(crate) enum ChangeCause {
     PartMoved,
     /// The place of the ball on the stylus, by a shift in T.
     TipBent,
+    /// The sink of the ball under a force, by a compliance.
+    StiffnessChanged,
 }
 
 /// When it changes.
@@ -39,15 +41,14 @@ impl ChangeCause {
         match self {
             Self::PartMoved => 6,
             Self::PartShifted | Self::TipBent => 3,
+            Self::StiffnessChanged => 1,
         }
     }
 
-    /// Whether it is of the part, and not of the stylus.
-    pub(crate) fn is_of_part(self) -> bool {
-        match self {
-            Self::PartShifted | Self::PartMoved => true,
-            Self::TipBent => false,
-        }
+    /// Whether both move the same thing.
+    pub(super) fn is_like(self, other: Self) -> bool {
+        let is_of_part = |cause| matches!(cause, Self::PartShifted | Self::PartMoved);
+        self == other || is_of_part(self) && is_of_part(other)
     }
 }
 
@@ -67,7 +68,7 @@ impl ChangeCourse {
 impl SessionChange {
     /// A centre with the change taken off, and the turn of directions that goes with it.
     ///
-    /// - `size`: shift, m, and turn, rad.
+    /// - `size`: shift, m, and turn, rad; of a stiffness the compliance, m/N, in place of the first.
     pub(super) fn undone(
         &self,
         press: &RecordedPress,
@@ -85,6 +86,9 @@ impl SessionChange {
                 (self.about + turn * moved, turn)
             }
             ChangeCause::TipBent => (centre + press.rotation * shift, UnitQuaternion::identity()),
+            ChangeCause::StiffnessChanged => {
+                (centre + press.force * shift.x, UnitQuaternion::identity())
+            }
         }
     }
 
@@ -106,6 +110,9 @@ impl SessionChange {
                 press.rotation.inverse_transform_vector(recorded),
                 Vector3::zeros(),
             ),
+            ChangeCause::StiffnessChanged => {
+                (Vector3::x() * press.force.dot(recorded), Vector3::zeros())
+            }
         };
         Vector6::from_iterator(by_shift.iter().chain(&by_turn).copied()) * share
     }

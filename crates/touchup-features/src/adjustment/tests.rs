@@ -16,7 +16,7 @@ const STROKE_NS: i64 = 1_000_000_000;
 ///
 /// - `made_with`: the session. `turned`: largest lean of the stylus, rad. `noise`: standard deviation
 ///   of a centre in each direction, m.
-fn presses_on_box(
+pub(super) fn presses_on_box(
     seed: u64,
     made_with: SessionNumbers,
     turned: f64,
@@ -54,6 +54,7 @@ fn presses_on_box(
                 ),
                 rotation,
                 force,
+                course: (to - from).component_mul(&(Vector3::repeat(1.0) - normal.abs())),
                 stroke,
             });
         }
@@ -61,7 +62,7 @@ fn presses_on_box(
     presses
 }
 
-fn numbers(compliance_mm_per_n: f64, offset_mm: [f64; 3]) -> SessionNumbers {
+pub(super) fn numbers(compliance_mm_per_n: f64, offset_mm: [f64; 3]) -> SessionNumbers {
     SessionNumbers {
         compliance: compliance_mm_per_n * 1e-3,
         offset_t: Vector3::from(offset_mm) * 1e-3,
@@ -76,7 +77,7 @@ fn vague() -> SessionNumbers {
     }
 }
 
-fn adjusted(presses: &[RecordedPress]) -> SessionAdjustment {
+pub(super) fn adjusted(presses: &[RecordedPress]) -> SessionAdjustment {
     SessionAdjustment::of(presses, RADIUS, SessionNumbers::default(), vague()).unwrap()
 }
 
@@ -96,7 +97,7 @@ fn moved(
 }
 
 /// Whether a change begins with a stroke, within two presses.
-fn is_at(course: ChangeCourse, stroke: i64) -> bool {
+pub(super) fn is_at(course: ChangeCourse, stroke: i64) -> bool {
     let ChangeCourse::At(at) = course else {
         return false;
     };
@@ -258,6 +259,24 @@ fn nothing_changes_in_a_session_as_it_should_be() {
     }
 }
 
+#[test]
+fn a_stylus_that_gets_softer_is_found_with_its_time() {
+    let mut presses = presses_on_box(11, numbers(0.05, [0.0; 3]), 0.6, 0.02e-3);
+    let softer = 0.06e-3;
+    for press in presses.iter_mut().filter(|press| press.stroke >= 50) {
+        press.centre -= press.force * softer;
+    }
+    let found = adjusted(&presses);
+    let likely = found.change.unwrap();
+    assert_eq!(likely.change.cause, ChangeCause::StiffnessChanged);
+    assert!(
+        likely.odds > 5.0 && is_at(likely.change.course, 50),
+        "{found:?}"
+    );
+    let off = (found.found.change[0] - softer).abs();
+    assert!(off < 3.5 * found.sigma.change[0], "{found:?}");
+}
+
 /// Derivatives of the distance from a bore by all numbers, against differences.
 #[test]
 fn derivatives_are_those_of_the_placed_press() {
@@ -267,12 +286,14 @@ fn derivatives_are_those_of_the_placed_press() {
         centre: Point3::new(2e-3, 1e-3, 5e-3),
         rotation: UnitQuaternion::from_euler_angles(0.3, -0.4, 0.5),
         force: Vector3::new(-1.0, -0.7, 0.2),
+        course: Vector3::zeros(),
         stroke: 0,
     };
     let causes = [
         ChangeCause::PartShifted,
         ChangeCause::PartMoved,
         ChangeCause::TipBent,
+        ChangeCause::StiffnessChanged,
     ];
     for cause in causes {
         let change = SessionChange {

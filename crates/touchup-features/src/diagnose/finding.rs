@@ -47,6 +47,8 @@ names! {
         WrenchSign = "wrench_sign",
         /// Wrench in axes other than those assumed.
         WrenchFrame = "wrench_frame",
+        /// Axes of the sensor with other gains, or that read into each other.
+        ForceGains = "force_gains",
         /// Wrench stamps later or earlier than the pose of the same instant.
         Delay = "delay",
         /// Contacts off the scan.
@@ -59,6 +61,8 @@ names! {
         PartMoved = "part_moved",
         /// The ball changed its place on the stylus.
         TipBent = "tip_bent",
+        /// The stylus bends more or less than before.
+        StiffnessChanged = "stiffness_changed",
         /// The stylus bends more or less than its stiffness predicts.
         Stiffness = "stiffness",
         /// Forces clipped at one value.
@@ -81,9 +85,11 @@ impl InputCause {
             | Self::WrenchFrame
             | Self::QuaternionOrder => true,
             Self::Stiffness
+            | Self::ForceGains
             | Self::TipOffset
             | Self::PartMoved
             | Self::TipBent
+            | Self::StiffnessChanged
             | Self::ZeroStamps
             | Self::TwoEpochs
             | Self::TimeUnit
@@ -153,7 +159,18 @@ impl InputFinding {
 
     /// Whether something changed while the session lasted.
     pub(super) fn is_of_change(&self) -> bool {
-        matches!(self.cause, InputCause::PartMoved | InputCause::TipBent)
+        matches!(
+            self.cause,
+            InputCause::PartMoved | InputCause::TipBent | InputCause::StiffnessChanged
+        )
+    }
+
+    /// Whether the directions of forces show it.
+    pub(super) fn is_of_sensor(&self) -> bool {
+        matches!(
+            self.cause,
+            InputCause::WrenchFrame | InputCause::ForceGains | InputCause::Tare
+        )
     }
 
     pub(super) fn with(self, numbers: Vec<FoundNumber>) -> Self {

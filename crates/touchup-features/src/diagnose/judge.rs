@@ -127,22 +127,34 @@ impl InputJudge<'_> {
         let is_of_poses = |finding: &InputFinding| finding.cause.is_read_off_the_scan();
         let is_doubted_place = findings.iter().any(is_of_poses);
         let wrench = is_placed.then(|| self.judge_wrench(&presses)).flatten();
+        let is_turned = wrench.as_ref().is_some_and(|(_, is_turned)| *is_turned);
+        let mut wrench = wrench.map(|(finding, _)| finding);
         if let Some(few) = few {
             let is_explained = is_doubted_place || wrench.is_some();
             findings.extend(if is_explained { wrench } else { Some(few) });
             return findings;
         }
-        // turned forces select other presses, and show other surfaces
-        let is_read = wrench.is_none();
-        let is_first =
-            |finding: &InputFinding| finding.is_sure && finding.cause != InputCause::Frame;
+        // forces in other axes select other presses, and show other surfaces
+        let is_read = wrench.is_none() || is_turned;
+        let is_first = |finding: &InputFinding| {
+            finding.is_sure && !matches!(finding.cause, InputCause::Frame | InputCause::Tare)
+        };
         let mut of_session = if is_read && !findings.iter().any(is_first) {
             self.judge_session(&presses)
         } else {
             Vec::new()
         };
+        // of the touches alone: a changed zero looks like a turned sensor
+        let is_doubted = wrench.as_ref().is_none_or(|finding| !finding.is_sure);
+        let is_of_sensor =
+            |finding: &InputFinding| finding.is_of_sensor() && (finding.is_sure || is_doubted);
+        if of_session.iter().any(is_of_sensor) {
+            wrench = None;
+            findings.retain(|finding| finding.cause != InputCause::Tare);
+        }
+        let is_read = wrench.is_none();
         // contacts of two places are on no scan
-        if of_session.iter().any(InputFinding::is_of_change) {
+        if is_read && of_session.iter().any(InputFinding::is_of_change) {
             let clock = self.judge_clock().filter(|finding| finding.is_sure);
             findings.retain(|finding| !is_of_poses(finding));
             findings.extend(clock.map_or(of_session, |clock| vec![clock]));
@@ -158,10 +170,14 @@ impl InputJudge<'_> {
             .flatten();
         findings.extend(registration);
         // each of these changes the contacts, and the course of the force
-        if wrench.is_none() && !findings.iter().any(|finding| finding.is_sure) {
+        let changes_course =
+            |finding: &InputFinding| finding.is_sure || finding.cause == InputCause::Tare;
+        if wrench.is_none() && !findings.iter().any(changes_course) {
             findings.extend(self.judge_clock());
         }
-        if findings.iter().any(|finding| finding.is_sure) {
+        let is_other =
+            |finding: &InputFinding| finding.is_sure && finding.cause != InputCause::Tare;
+        if findings.iter().any(is_other) {
             of_session.clear();
         }
         // radius last: a wrong place or stiffness moves the centre as far
@@ -375,7 +391,9 @@ impl InputJudge<'_> {
     }
 
     /// Checks sign and axes of the wrench by the presses on the scan.
-    fn judge_wrench(&self, presses: &Presses) -> Option<InputFinding> {
+    ///
+    /// The flag: a turn by any angle explains it best.
+    fn judge_wrench(&self, presses: &Presses) -> Option<(InputFinding, bool)> {
         let other_frame = match self.params.compensator.wrench_frame {
             WrenchFrame::Sensor => "read in the frame of the poses",
             WrenchFrame::Object => "read in the axes of the stylus",
@@ -604,7 +622,7 @@ impl InputJudge<'_> {
     }
 }
 
-const TARE_REMEDY: &str =
+pub(super) const TARE_REMEDY: &str =
     "tare the sensor in free air, or give payload and bias (touchup calibrate payload)";
 
 fn no_contact(measured: String) -> InputFinding {

@@ -17,6 +17,7 @@ mod placed;
 mod places;
 mod pose_course;
 mod registration;
+mod sensor;
 mod session;
 mod shift;
 mod stamps;

@@ -4,6 +4,7 @@
 use nalgebra::{Vector3, Vector6};
 
 use super::finding::{FoundNumber, InputCause, InputFinding};
+use super::input_record::InputRecord;
 use super::judge::{InputJudge, Presses};
 use crate::adjustment::{
     ChangeCause, ChangeCourse, LikelyChange, RecordedPress, SessionAdjustment, SessionNumbers,
@@ -14,6 +15,10 @@ use touchup_method::stylus::{TipParams, TipShape};
 /// slow wander of a tracker.
 const STROKE_PAUSE_NS: i64 = 100_000_000;
 const LONGEST_STROKE_NS: i64 = 1_000_000_000;
+/// Number of means of presses on each side whose distance is the course of the ball, and its least
+/// length, m.
+const COURSE_REACH: isize = 2;
+const LEAST_COURSE: f64 = 0.3e-3;
 /// Standard uncertainties before the presses: whatever they show.
 const ANY: SessionNumbers = SessionNumbers {
     compliance: 1e-3,
@@ -25,10 +30,10 @@ const ANY: SessionNumbers = SessionNumbers {
 const OF_MODEL: f64 = 0.02e-3;
 /// Minimum difference of told and found in standard uncertainties, for a doubt and for a sure
 /// finding.
-const DOUBTED_SIGMAS: f64 = 4.0;
-const SURE_SIGMAS: f64 = 6.0;
+pub(super) const DOUBTED_SIGMAS: f64 = 4.0;
+pub(super) const SURE_SIGMAS: f64 = 6.0;
 /// Minimum natural logarithm of the odds against the next likely cause, and against none.
-const CLEAR_ODDS: f64 = 5.0;
+pub(super) const CLEAR_ODDS: f64 = 5.0;
 
 /// Units of force that are read as N, N, and largest uncertainty of a sink that shows one, as a share
 /// of it.
@@ -59,19 +64,28 @@ impl InputJudge<'_> {
         let sigma = &mut adjusted.sigma;
         sigma.compliance = sigma.compliance.hypot(OF_MODEL / presses.levels.largest);
         sigma.offset_t.apply(|sigma| *sigma = sigma.hypot(OF_MODEL));
+        let is_softer = adjusted
+            .change
+            .is_some_and(|likely| likely.change.cause == ChangeCause::StiffnessChanged);
         for (at, sigma) in sigma.change.iter_mut().enumerate() {
-            let of_model = if at < 3 { OF_MODEL } else { OF_MODEL / extent };
+            let of_model = match at {
+                0 if is_softer => OF_MODEL / presses.levels.largest,
+                0..3 => OF_MODEL,
+                _ => OF_MODEL / extent,
+            };
             *sigma = sigma.hypot(of_model);
         }
         let change = adjusted
             .change
             .and_then(|change| self.change_finding(&adjusted, &change));
+        let force = adjusted.force.as_ref();
+        let force = force.and_then(|force| self.force_finding(presses, force));
         if let Some(change) = change {
-            return vec![change];
+            return [change].into_iter().chain(force).collect();
         }
         let stiffness = stiffness_finding(&adjusted, told.compliance, self.params.stiffness_share);
         let place = place_finding(&adjusted, self.params.place_sigma);
-        stiffness.into_iter().chain(place).collect()
+        force.into_iter().chain(stiffness).chain(place).collect()
     }
 
     /// The presses with the numbers of their strokes.
@@ -80,25 +94,27 @@ impl InputJudge<'_> {
         let first = self.pressing.first().map_or(0, |record| record.stamp_ns);
         let (mut stroke, mut begun, mut last) = (0, first, first);
         let pressing = self.pressing.iter();
-        pressing
-            .filter(|record| levels.is_pressing(record))
-            .map(|record| {
-                let now = record.stamp_ns;
-                let is_apart = now.saturating_sub(last) > STROKE_PAUSE_NS
-                    || now.saturating_sub(begun) > LONGEST_STROKE_NS;
-                if is_apart {
-                    (stroke, begun) = (stroke + 1, now);
-                }
-                last = now;
-                RecordedPress {
-                    stamp_ns: now,
-                    centre: record.centre,
-                    rotation: record.rotation,
-                    force: levels.force_o(record),
-                    stroke,
-                }
-            })
-            .collect()
+        let pressing = pressing.filter(|record| levels.is_pressing(record));
+        let pressing: Vec<&InputRecord> = pressing.collect();
+        let of = pressing.iter().enumerate();
+        of.map(|(at, record)| {
+            let now = record.stamp_ns;
+            let is_apart = now.saturating_sub(last) > STROKE_PAUSE_NS
+                || now.saturating_sub(begun) > LONGEST_STROKE_NS;
+            if is_apart {
+                (stroke, begun) = (stroke + 1, now);
+            }
+            last = now;
+            RecordedPress {
+                stamp_ns: now,
+                centre: record.centre,
+                rotation: record.rotation,
+                force: levels.force_o(record),
+                course: course_around(&pressing, at),
+                stroke,
+            }
+        })
+        .collect()
     }
 
     /// A part that moved, or a ball that changed its place.
@@ -145,6 +161,15 @@ impl InputJudge<'_> {
                 format!("{when} the ball is {shift} from where it was, in the axes of the stylus"),
                 "measure the tip again (touchup calibrate tip), and record the part again",
             ),
+            ChangeCause::StiffnessChanged => (
+                InputCause::StiffnessChanged,
+                format!(
+                    "{when} the ball sinks by {:.4} ± {:.4} mm/N more",
+                    adjusted.found.change[0] * 1e3,
+                    adjusted.sigma.change[0] * 1e3
+                ),
+                "tighten the tip in its holder, and record the part again",
+            ),
         };
         let measured = format!(
             "{what}: {} presses on {} surfaces agree then",
@@ -158,7 +183,7 @@ impl InputJudge<'_> {
         })
     }
 
-    fn since_first(&self, stamp_ns: i64) -> f64 {
+    pub(super) fn since_first(&self, stamp_ns: i64) -> f64 {
         let first = self
             .records
             .first()
@@ -166,7 +191,7 @@ impl InputJudge<'_> {
         stamp_ns.saturating_sub(first) as f64 * 1e-9
     }
 
-    fn course_in_words(&self, course: ChangeCourse) -> String {
+    pub(super) fn course_in_words(&self, course: ChangeCourse) -> String {
         match course {
             ChangeCourse::At(at) => format!("from {:.1} s on", self.since_first(at)),
             ChangeCourse::Between(from, to) => format!(
@@ -183,17 +208,17 @@ impl InputJudge<'_> {
         likely: &LikelyChange,
     ) -> Vec<FoundNumber> {
         let cause = likely.change.cause;
-        let names = if cause.is_of_part() {
-            [
+        let names = match cause {
+            ChangeCause::PartShifted | ChangeCause::PartMoved => [
                 "shift_x_mm",
                 "shift_y_mm",
                 "shift_z_mm",
                 "turn_x_deg",
                 "turn_y_deg",
                 "turn_z_deg",
-            ]
-        } else {
-            ["bend_x_mm", "bend_y_mm", "bend_z_mm", "", "", ""]
+            ],
+            ChangeCause::TipBent => ["bend_x_mm", "bend_y_mm", "bend_z_mm", "", "", ""],
+            ChangeCause::StiffnessChanged => ["compliance_more_mm_per_n", "", "", "", "", ""],
         };
         let sizes = adjusted.found.change.iter().zip(&adjusted.sigma.change);
         let sizes = names
@@ -214,6 +239,26 @@ impl InputJudge<'_> {
             ChangeCourse::Between(..) => None,
         };
         sizes.chain(about).chain(at).collect()
+    }
+}
+
+/// Way of the ball from shortly before a press to shortly after it, m, in O; 0 if it rests there.
+fn course_around(pressing: &[&InputRecord], at: usize) -> Vector3<f64> {
+    let now = pressing[at];
+    let beside = |step: isize| {
+        let others = (1..=COURSE_REACH).map_while(|by| {
+            let other = pressing.get(at.checked_add_signed(step * by)?)?;
+            let between = pressing[at.checked_add_signed(step * (by - 1))?];
+            let pause_ns = other.stamp_ns.saturating_sub(between.stamp_ns).abs();
+            (pause_ns <= STROKE_PAUSE_NS).then_some(*other)
+        });
+        others.last().unwrap_or(now)
+    };
+    let way = beside(1).centre - beside(-1).centre;
+    if way.norm() < LEAST_COURSE {
+        Vector3::zeros()
+    } else {
+        way
     }
 }
 

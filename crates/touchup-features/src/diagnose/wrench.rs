@@ -209,11 +209,14 @@ fn turned_reading(presses: &[ReadPress]) -> Option<WrenchReading> {
 }
 
 /// The fault in sign or axes of the wrench; `None` if no reading explains the forces better than
-/// the given one.
+/// the given one. The flag: it is a turn by any angle.
 ///
 /// - `presses`: on the scan.
 /// - `other_frame`: the other possible axes of the wrench, in words.
-pub(super) fn judge_wrench(presses: &[ReadPress], other_frame: &str) -> Option<InputFinding> {
+pub(super) fn judge_wrench(
+    presses: &[ReadPress],
+    other_frame: &str,
+) -> Option<(InputFinding, bool)> {
     let places: BTreeSet<VoxelKey> = presses.iter().map(|press| press.place).collect();
     if presses.len() < FEWEST || places.len() < FEWEST_PLACES {
         return None;
@@ -235,10 +238,9 @@ pub(super) fn judge_wrench(presses: &[ReadPress], other_frame: &str) -> Option<I
         .find(|other| is_possible(other))
         .filter(|first| first.mean > as_read.mean)
         .unwrap_or(&as_read);
-    let best = turned
-        .as_ref()
-        .filter(|turned| turned.mean > fixed.mean + LEAST_GAIN)
-        .unwrap_or(fixed);
+    let turned = turned.as_ref();
+    let turned = turned.filter(|turned| turned.mean > fixed.mean + LEAST_GAIN);
+    let best = turned.unwrap_or(fixed);
     let cause = best.cause.filter(|_| is_better(best, &as_read))?;
     // with w first and an upright stylus, the wrench is right in the axes of the poses
     let is_order = cause == InputCause::QuaternionOrder;
@@ -252,7 +254,8 @@ pub(super) fn judge_wrench(presses: &[ReadPress], other_frame: &str) -> Option<I
         degrees(best.mean),
         best.says
     );
-    Some(InputFinding::new(cause, is_sure, measured, best.remedy))
+    let finding = InputFinding::new(cause, is_sure, measured, best.remedy);
+    Some((finding, turned.is_some()))
 }
 
 /// The unit vector along the scan, in O, of the sliding that ends at record `at`, from an earlier

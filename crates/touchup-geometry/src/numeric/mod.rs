@@ -25,7 +25,7 @@ pub use moments::{centroid_and_spread, mean, scatter, spreads, thinnest_directio
 pub use normal::{circle_probability, normal_cdf, normal_quantile};
 pub use point_grid::PointGrid;
 pub use quantile::{largest, median, order_statistic, quantile, weighted_quantile};
-pub use robust::{SIGMA_OF_MEDIAN, TUKEY_WIDTH, biweight, cauchy_weight};
+pub use robust::{SIGMA_OF_MEDIAN, TUKEY_WIDTH, biweight, cauchy_cost, cauchy_weight};
 pub use running_median::RunningMedian;
 pub use sets::{DisjointSets, distinct, flood, without_repeats};
 pub use twist::{moved_by_twist, point_to_plane_row};
