@@ -24,6 +24,8 @@ def class_name(section: str) -> str:
 
 
 def type_of(key: dict) -> str:
+    if key["is_list"]:
+        return f"list[{class_name(key['name'])}]"
     if key["is_section"]:
         return f"{class_name(key['name'])} | Literal[False, \"off\"] | None"
     if key["words"]:

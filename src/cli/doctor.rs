@@ -13,7 +13,7 @@ use super::{CliError, Losses, print_report};
 use touchup_features::diagnose::InputFinding;
 use touchup_io::mesh_file::MeshUnit;
 use touchup_session::input_check::{InputCheck, check_input};
-use touchup_session::refinement::{InputNames, WrenchOffset, refuse_unsound};
+use touchup_session::refinement::{AcceptedFinding, InputNames, WrenchOffset, refuse_unsound};
 use touchup_session::scan::read_scan;
 
 #[derive(Debug, Args)]
@@ -49,8 +49,8 @@ struct Diagnosis {
     told: ToldNumbers,
     /// Clock offset from scene and recording together.
     wrench_offset: Option<WrenchOffset>,
-    /// Findings, surest first.
-    findings: Vec<InputFinding>,
+    /// Findings, surest first, and the settings that take them off.
+    findings: Vec<AcceptedFinding>,
 }
 
 /// Settings, then a line for each finding.
@@ -62,7 +62,11 @@ impl fmt::Display for Diagnosis {
         }
         self.findings
             .iter()
-            .try_for_each(|finding| write!(f, "\n{finding}"))
+            .try_for_each(|AcceptedFinding { finding, settings }| {
+                write!(f, "\n{finding}")?;
+                let mut settings = settings.iter();
+                settings.try_for_each(|setting| write!(f, "\n  taken off by {setting}"))
+            })
     }
 }
 
@@ -80,17 +84,18 @@ pub(super) fn doctor(arguments: &DoctorArguments) -> Result<Losses, CliError> {
     } = found;
     let wrench_offset = clock_offset.map(|found| WrenchOffset::of(&found, &scene.sync_params()));
     let sure = findings.iter().filter(|finding| finding.is_sure).count();
+    let accepted = |finding: &InputFinding| AcceptedFinding::of(finding.clone(), &scene);
     let diagnosis = Diagnosis {
         is_sound: sure == 0,
         told,
         wrench_offset,
-        findings,
+        findings: findings.iter().map(accepted).collect(),
     };
     print_report(arguments.json, &diagnosis, || diagnosis.to_string())?;
     let names = InputNames {
         scan: &arguments.scan,
         recording: &arguments.recording,
     };
-    refuse_unsound(&diagnosis.findings, names)?;
+    refuse_unsound(&findings, names)?;
     Ok(losses)
 }

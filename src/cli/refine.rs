@@ -8,8 +8,8 @@ use clap::builder::{OsStringValueParser, TypedValueParser};
 #[cfg(any(feature = "ros", feature = "r2r"))]
 use super::common::path_parameter::path;
 use super::common::recorded::RecordingFlags;
-use super::common::refinement::{RefinementFiles, RefinementResult};
-use super::common::told::{ToldFlags, ToldNumbers};
+use super::common::refinement::{RefinementFiles, RefinementResult, accepted_scene_beside};
+use super::common::told::{ToldFlags, ToldScene};
 #[cfg(any(feature = "ros", feature = "r2r"))]
 use super::common::web::WebFlags;
 #[cfg(any(feature = "ros", feature = "r2r"))]
@@ -22,7 +22,7 @@ use touchup_node::node::NodeEnd;
 use touchup_session::live::Pace;
 use touchup_session::refinement::RefinementOptions;
 use touchup_session::replay::RecordedAs;
-use touchup_session::scene::{Mode, Scene};
+use touchup_session::scene::{Mode, Scene, Setting};
 use touchup_session::session::{ResultFiles, SessionRecord, StrokeChanges};
 
 #[derive(Clone, Debug, Default, Args)]
@@ -76,6 +76,11 @@ pub(super) struct RefineArguments {
     /// target of refined.ply, features.json and touches.csv unless flags give their paths
     #[arg(long, value_name = "SESSION", conflicts_with_all = ["scan", "bag", "scene", "mesh_unit", "wrench_topic", "pose_topic", "pose_frame", "markers_topic"])]
     resume: Option<PathBuf>,
+    /// Takes off what the touches surely show (`touchup doctor`): a part that moved, a tip that
+    /// bent, place and stiffness of the tip, delay of the wrench; writes accepted_scene.yaml beside
+    /// the mesh
+    #[arg(long, conflicts_with_all = ["live", "force"])]
+    accept: bool,
     /// Refines despite sure findings in the recording (`touchup doctor`)
     #[arg(long)]
     force: bool,
@@ -160,7 +165,7 @@ impl RefineArguments {
             return Ok(self);
         }
         self.check_page()?;
-        let (scene, _) = self.scene()?;
+        let scene = self.scene()?.scene;
         self.check_out()?;
         let (recording, markers) = self.recorded.open(&self.bag, &scene)?;
         let folder = self
@@ -235,7 +240,8 @@ impl RefineArguments {
 
     /// Reads, replays and writes.
     fn refined(&self) -> Result<RefinementResult, CliError> {
-        let (scene, told) = self.scene()?;
+        let told = self.scene()?;
+        let scene = &told.scene;
         self.check_out()?;
         // a scene without an update has an error of its own
         let has_patch = scene.refine.is_none() || scene.patcher_params().is_some();
@@ -262,7 +268,11 @@ impl RefineArguments {
             force: self.force,
             ..RefinementOptions::default()
         };
-        files.refine(scene, told, options)
+        if self.accept {
+            files.refine_accepting(&told, options)
+        } else {
+            files.refine(told.scene, told.numbers, options)
+        }
     }
 
     /// Checks the outputs before the work begins.
@@ -274,7 +284,9 @@ impl RefineArguments {
             }
             error => CliError::not_written(error),
         })?;
+        let accepted = self.accept.then(|| accepted_scene_beside(&self.out));
         let outputs = [
+            ("--accept", accepted.as_ref()),
             ("--out", Some(&self.out)),
             ("--features-out", self.features_out.as_ref()),
             ("--touches-out", self.touches_out.as_ref()),
@@ -306,12 +318,19 @@ impl RefineArguments {
     }
 
     /// Scene with the flags over it, and the sources of its numbers.
-    fn scene(&self) -> Result<(Scene, ToldNumbers), CliError> {
-        let (mut scene, told) = self.told.scene(self.scene.as_deref())?;
+    fn scene(&self) -> Result<ToldScene, CliError> {
+        let (mut scene, numbers) = self.told.scene(self.scene.as_deref())?;
+        let mut settings = self.told.settings();
         if let Some(mode) = self.mode {
             scene.refine.get_or_insert_default().mode = mode;
+            settings.push(Setting::word("refine.mode", mode));
         }
-        Ok((scene, told))
+        Ok(ToldScene {
+            scene,
+            numbers,
+            path: self.scene.clone(),
+            settings,
+        })
     }
 }
 

@@ -17,6 +17,7 @@ mod soundness;
 #[path = "../common/static_scan.rs"]
 mod static_scan;
 
+mod accepted;
 mod align;
 mod allocation;
 mod allocations;

@@ -102,6 +102,7 @@ fn every_key_of_the_code_is_in_the_shipped_file_and_documented() {
         "columns",
         "markers",
         "scan_to_space",
+        "changes",
         "compensation",
         "bias_tracking",
         "contact",
@@ -118,12 +119,13 @@ fn every_key_of_the_code_is_in_the_shipped_file_and_documented() {
     let sections = [&outer[..], &inner].concat();
     for section in sections {
         let path: Vec<_> = section.split('.').filter(|name| !name.is_empty()).collect();
-        let yaml = path
-            .iter()
-            .rev()
-            .fold("{ no_such_key: 1 }".to_owned(), |inner, name| {
-                format!("{{ {name}: {inner} }}")
-            });
+        let yaml =
+            path.iter()
+                .rev()
+                .fold("{ no_such_key: 1 }".to_owned(), |inner, name| match *name {
+                    "changes" => format!("{{ {name}: [{inner}] }}"),
+                    _ => format!("{{ {name}: {inner} }}"),
+                });
         let error = Scene::from_yaml(&yaml).unwrap_err().to_string();
         let list = error
             .split("expected one of")
@@ -142,7 +144,8 @@ fn every_key_of_the_code_is_in_the_shipped_file_and_documented() {
         .lines()
         .filter(|line| !line.trim_start().starts_with('#'))
     {
-        in_file.extend(line.split_once(':').map(|(key, _)| key.trim().to_owned()));
+        let key = line.split_once(':').map(|(key, _)| key.trim());
+        in_file.extend(key.map(|key| key.trim_start_matches("- ").to_owned()));
     }
     assert_eq!(in_file, known);
     assert!(known.len() >= 35, "{known:?}");
@@ -336,7 +339,7 @@ fn a_header_alone_takes_the_defaults() {
         assert_eq!(scene, expected, "{name}");
         sections += 1;
     }
-    assert_eq!(sections, 17);
+    assert_eq!(sections, 18);
     let inner = Scene::from_yaml("compensation:\n  payload:\n  bias:\n")
         .unwrap()
         .compensation
@@ -581,6 +584,22 @@ const MISTAKES: &[(&str, &[&str])] = &[
         &["expected keys with values, or off", "line 1"],
     ),
     ("patch: 3", &["expected keys with values, or off", "line 1"]),
+    (
+        "changes: [{ shift_mm: [1, 0, 0] }]",
+        &["changes needs changes.from_s"],
+    ),
+    (
+        "changes: [{ from_s: 2, to_s: 1 }]",
+        &["changes.to_s is 1", "changes.from_s or later"],
+    ),
+    (
+        "changes: [{ cause: tip_bent, from_s: 2, turn_deg: [0, 0, 3] }]",
+        &["changes.turn_deg is 3", "0 for a tip"],
+    ),
+    (
+        "changes: [{ cause: scan_moved, from_s: 2 }]",
+        &["scan_moved", "tip_bent", "line 1"],
+    ),
     ("[", &["line"]),
 ];
 
@@ -611,8 +630,9 @@ fn the_shape_of_the_tip_reaches_refiner_and_patcher() {
         );
         let corners = [[0.0, 0.0], [0.01, 0.0], [0.0, 0.01]].map(|[x, y]| Point3::new(x, y, 0.0));
         let mesh = TriMesh::new(corners.to_vec(), vec![[0, 1, 2]]).unwrap();
+        let radius = patcher.evidence.radius;
         assert!(Refiner::new(mesh, refiner).is_ok() && Patcher::new(patcher).is_ok());
-        (refiner.shape, patcher.evidence.radius)
+        (refiner.shape, radius)
     };
     assert_eq!(shapes("radius_mm: 1.5"), (TipShape::Ball, 1.5e-3));
     let flat = TipShape::Flat {
@@ -968,7 +988,7 @@ fn a_scene_reports_what_is_built_of_it_and_what_is_left_out() {
             .built(&unused, &[("feature x", false)])
     };
     let text = built("{}").to_string();
-    let unnamed = "markers, scan_to_space, compensation, bias_tracking, scan.region, robot (not named in the scene)";
+    let unnamed = "markers, scan_to_space, changes, compensation, bias_tracking, scan.region, robot (not named in the scene)";
     assert_eq!(
         text,
         format!(
@@ -977,7 +997,7 @@ fn a_scene_reports_what_is_built_of_it_and_what_is_left_out() {
         )
     );
     let off = built("{ guard: off, patch: off, robot: , clock: off }").to_string();
-    let left_out = "clock, guard, patch (off in the scene); markers, scan_to_space, compensation, bias_tracking, scan.region (not named \
+    let left_out = "clock, guard, patch (off in the scene); markers, scan_to_space, changes, compensation, bias_tracking, scan.region (not named \
                     in the scene); uncertainty (of the patch, which is left out); robot (no arm here)";
     assert!(
         off.starts_with(&format!(
@@ -1006,7 +1026,7 @@ fn a_scene_reports_what_is_built_of_it_and_what_is_left_out() {
         serde_json::json!({ "part": "clock", "reason": "no clock here" })
     );
     // all parts are either built or left out, once
-    assert_eq!(paper.built.len() + paper.left_out.len(), 18);
+    assert_eq!(paper.built.len() + paper.left_out.len(), 19);
 }
 
 /// The settings lack everything in the list of omissions: of a section that the scene names and the

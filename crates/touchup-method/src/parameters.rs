@@ -172,6 +172,8 @@ pub struct Parameter {
     pub inner: Vec<Parameter>,
     /// whether the key is a section
     pub is_section: bool,
+    /// whether its value is a list of sections
+    pub is_list: bool,
 }
 
 impl Parameter {
@@ -209,8 +211,10 @@ pub trait Value: Sized {
     type Written: DeserializeOwned;
     /// Allowed words.
     const WORDS: &'static [&'static str] = &[];
-    /// Whether the type is a section, optional or not.
+    /// Whether the type is a section, optional or not, or a list of them.
     const IS_SECTION: bool = false;
+    /// Whether the type is a list of sections.
+    const IS_LIST: bool = false;
 
     /// Converts a YAML value to SI.
     fn of(written: Self::Written, unit: Unit) -> Self;
@@ -371,17 +375,28 @@ places!(Vector3<f64>, Point3<f64>);
 
 impl<T: Value> Value for Vec<T> {
     type Written = Vec<T::Written>;
+    const IS_SECTION: bool = T::IS_SECTION;
+    const IS_LIST: bool = T::IS_SECTION;
 
     fn of(written: Self::Written, unit: Unit) -> Self {
         written.into_iter().map(|one| T::of(one, unit)).collect()
     }
 
     fn yaml(&self, unit: Unit) -> Option<String> {
-        Some(list(self, unit))
+        // a list of sections is absent without any
+        (!T::IS_SECTION).then(|| list(self, unit))
     }
 
     fn numbers(&self) -> Vec<f64> {
         self.iter().flat_map(T::numbers).collect()
+    }
+
+    fn check(&self) -> Result<(), SettingError> {
+        self.iter().try_for_each(T::check)
+    }
+
+    fn inner() -> Vec<Parameter> {
+        T::inner()
     }
 }
 
@@ -701,6 +716,7 @@ macro_rules! parameters {
                         example: $crate::parameters!(@or $($example)?),
                         doc,
                         is_section: <$type as $crate::parameters::Value>::IS_SECTION,
+                        is_list: <$type as $crate::parameters::Value>::IS_LIST,
                         inner: <$type as $crate::parameters::Value>::inner(),
                     });)?
                 )*

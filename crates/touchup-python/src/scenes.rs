@@ -74,6 +74,7 @@ fn declared(parameter: &Parameter) -> Value {
         "example": value(parameter.example),
         "summary": parameter.summary(),
         "is_section": parameter.is_section,
+        "is_list": parameter.is_list,
         "inner": parameter.inner.iter().map(declared).collect::<Vec<_>>(),
     })
 }

@@ -37,13 +37,13 @@ pub fn check_input(
     at_each: &mut dyn FnMut(),
 ) -> Result<InputCheck, ReplayError> {
     let params = scene.input_monitor_params(recording.wrench_frame);
-    let monitor = RefCell::new(InputMonitor::new(params)?);
     let contact = ContactEstimatorParams {
         compensator: params.compensator,
         gate: Some(scene.contact.unwrap_or_default()),
         ..ContactEstimatorParams::new(params.tip)
     };
     let mut estimator = ContactEstimator::new(contact)?;
+    let monitor = RefCell::new(InputMonitor::new(params)?);
     let replayed = each_sample(
         recording,
         scene.placement(),

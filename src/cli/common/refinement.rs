@@ -1,6 +1,7 @@
 //! Refinement from files to files, for all refining verbs.
 
 use std::fmt;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -8,14 +9,16 @@ use serde::Serialize;
 use tracing::warn;
 
 use super::progress::WorkProgress;
-use super::told::ToldNumbers;
-use crate::cli::{CliError, Losses, by_reason};
+use super::told::{ToldNumbers, ToldScene};
+use crate::cli::{CliError, Losses, by_reason, not_written};
 use touchup_geometry::mesh::RepairReport;
+use touchup_io::atomic::write_atomically;
 use touchup_io::mesh_file::MeshUnit;
 use touchup_method::reconstruct::CloudSummary;
 use touchup_session::live::Quantiles;
 use touchup_session::refinement::{
-    InputNames, OpenedInput, RefinedScan, Refinement, RefinementOptions, RefinementSummary,
+    AcceptedFinding, AcceptedScene, InputNames, OpenedInput, RefinedScan, Refinement,
+    RefinementError, RefinementOptions, RefinementSummary,
 };
 use touchup_session::replay::RecordedAs;
 use touchup_session::scene::{LeftOut, Memory, Scene, SceneCost};
@@ -39,6 +42,9 @@ pub(in crate::cli) struct RefineSummary {
     scene: SceneCost,
     /// Numbers of tip and scan, and their sources.
     told: ToldNumbers,
+    /// What was taken off by settings of the scene; absent without anything.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    taken_off: Option<AcceptedSummary>,
     /// Origin of the scan in a point cloud; absent for a mesh.
     #[serde(skip_serializing_if = "Option::is_none")]
     cloud: Option<CloudSummary>,
@@ -49,6 +55,35 @@ pub(in crate::cli) struct RefineSummary {
     step: Option<StepFileSummary>,
     load_s: f64,
     replay_s: f64,
+}
+
+/// What was taken off.
+#[derive(Debug, Serialize)]
+struct AcceptedSummary {
+    /// File of the scene that was used.
+    scene: String,
+    /// The findings, one after the other.
+    findings: Vec<AcceptedFinding>,
+}
+
+/// A refined scan before it is written; times in s.
+struct MadeRefinement {
+    refined: RefinedScan,
+    repair: RepairReport,
+    cloud: Option<CloudSummary>,
+    cost: SceneCost,
+    load_s: f64,
+    replay_s: f64,
+}
+
+/// What remains of a change.
+const PARTLY_KNOWN: &str = "what is unknown of a change is still in the mesh";
+/// Name of the scene with what was taken off.
+const ACCEPTED_SCENE: &str = "accepted_scene.yaml";
+
+/// The file of the scene with what was taken off, beside a mesh.
+pub(in crate::cli) fn accepted_scene_beside(mesh: &Path) -> PathBuf {
+    mesh.with_file_name(ACCEPTED_SCENE)
 }
 
 /// Result of refining a scan.
@@ -88,6 +123,48 @@ impl RefinementFiles {
         told: ToldNumbers,
         options: RefinementOptions,
     ) -> Result<RefinementResult, CliError> {
+        self.written(self.made(scene, options)?, told)
+    }
+
+    /// As [`Self::refine`], and takes sure findings off by settings of the scene, which it then
+    /// writes beside the mesh.
+    pub fn refine_accepting(
+        &self,
+        base: &ToldScene,
+        options: RefinementOptions,
+    ) -> Result<RefinementResult, CliError> {
+        let mut accepted = AcceptedScene::new(base.scene.clone());
+        let made = loop {
+            match self.made(accepted.scene.clone(), options.clone()) {
+                Err(RefinementError::Unsound { finding, .. }) if accepted.take_off(&finding)? => {}
+                made => break made?,
+            }
+        };
+        if accepted.findings.is_empty() {
+            return self.written(made, base.numbers.clone());
+        }
+        let scene = accepted_scene_beside(&self.out.mesh);
+        let text = base.accepted_text(&accepted, &scene)?;
+        let told = ToldNumbers::of(&accepted.scene, &text, [None; 3]);
+        let mut result = self.written(made, told)?;
+        write_atomically(&scene, |file| file.write_all(text.as_bytes()))
+            .map_err(not_written(&scene))?;
+        let partly = accepted.findings.iter().filter(|of| !of.is_whole());
+        let partly = partly.map(|of| format!("{PARTLY_KNOWN}: {}", of.finding.measured));
+        result.losses.extend(partly);
+        result.summary.taken_off = Some(AcceptedSummary {
+            scene: scene.display().to_string(),
+            findings: accepted.findings,
+        });
+        Ok(result)
+    }
+
+    /// Reads scan and recording, and refines.
+    fn made(
+        &self,
+        scene: Scene,
+        options: RefinementOptions,
+    ) -> Result<MadeRefinement, RefinementError> {
         let started = Instant::now();
         let OpenedInput {
             input,
@@ -102,33 +179,58 @@ impl RefinementFiles {
         )?;
         let mut refinement = Refinement::new(input, recording.wrench_frame, options)?;
         let load_s = started.elapsed().as_secs_f64();
-        let scene = self.cost(&refinement);
+        let cost = self.cost(&refinement);
 
         let started = Instant::now();
         let mut progress = WorkProgress::new("replay", recording.message_count());
         refinement.replay(recording, markers, &mut || progress.step())?;
         drop(progress);
         let replay_s = started.elapsed().as_secs_f64();
-        let stage = WorkProgress::stage("reconstruct");
+        let _stage = WorkProgress::stage("reconstruct");
         let names = InputNames {
             scan: &self.scan,
             recording: &self.recording,
         };
+        Ok(MadeRefinement {
+            refined: refinement.finish(names)?,
+            repair,
+            cloud,
+            cost,
+            load_s,
+            replay_s,
+        })
+    }
+
+    fn written(
+        &self,
+        made: MadeRefinement,
+        told: ToldNumbers,
+    ) -> Result<RefinementResult, CliError> {
+        let MadeRefinement {
+            refined,
+            repair,
+            cloud,
+            cost,
+            load_s,
+            replay_s,
+        } = made;
         let RefinedScan {
             mesh,
             summary: refinement,
             losses,
-        } = refinement.finish(names)?;
+        } = refined;
         refinement
             .findings
             .iter()
             .for_each(|finding| warn!("{finding}"));
+        let stage = WorkProgress::stage("write");
         let written = self.out.write(mesh, &self.scan, self.mesh_unit)?;
         let step = written.transpose()?;
         drop(stage);
         let summary = RefineSummary {
-            scene,
+            scene: cost,
             told,
+            taken_off: None,
             cloud,
             refinement,
             step,
@@ -214,6 +316,11 @@ impl RefineSummary {
 impl fmt::Display for RefineSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}\n{}", self.refinement.verdict(), self.told)?;
+        if let Some(AcceptedSummary { scene, findings }) = &self.taken_off {
+            let mut findings = findings.iter().map(|of| &of.finding.measured);
+            findings.try_for_each(|measured| write!(f, "\ntaken off: {measured}"))?;
+            write!(f, "\nscene with what was taken off: {scene}")?;
+        }
         match self.refinement.to_string() {
             further if further.is_empty() => {}
             further => write!(f, "\n{further}")?,

@@ -1,12 +1,13 @@
 //! Settings of tip and scan that determine a result, and their sources.
 
 use std::fmt;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde::Serialize;
 
 use crate::cli::CliError;
+use touchup_session::refinement::AcceptedScene;
 use touchup_session::scene::{Scene, Setting};
 
 /// Flags for tip and scan, over the scene.
@@ -93,6 +94,43 @@ impl ToldFlags {
         };
         self.tell(&mut Scene::from_yaml(&yaml)?, &yaml)?;
         Ok(Scene::edited(&yaml, &self.settings(), "given by flags")?)
+    }
+}
+
+/// A scene with its sources.
+#[derive(Clone, Debug)]
+pub(in crate::cli) struct ToldScene {
+    pub scene: Scene,
+    pub numbers: ToldNumbers,
+    /// Its file; `None`: the default scene.
+    pub path: Option<PathBuf>,
+    /// Settings over the file.
+    pub settings: Vec<Setting>,
+}
+
+impl ToldScene {
+    /// Text of this scene with what was taken off, for a file at `place`.
+    ///
+    /// # Errors
+    /// A scene whose text form allows no edits.
+    pub fn accepted_text(
+        &self,
+        accepted: &AcceptedScene,
+        place: &Path,
+    ) -> Result<String, CliError> {
+        let Some(path) = &self.path else {
+            return Ok(accepted.text("", &self.settings)?);
+        };
+        let [own, other] = [path.as_path(), place].map(std::path::absolute);
+        let (own, other) = (own?, other?);
+        let mut settings = self.settings.clone();
+        if let Some(folder) = own
+            .parent()
+            .filter(|folder| Some(*folder) != other.parent())
+        {
+            settings.extend(self.scene.files_in(folder)?);
+        }
+        Ok(accepted.text(&Scene::read_with_text(path)?.1, &settings)?)
     }
 }
 

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from .causes import ANY, CAUSES_OF, CONTROLS
+from .kind import numbers_of
 
 
 def score_all(folders, cases, checker, workers):
@@ -63,12 +64,11 @@ def compared(change, found):
 
 
 def at_pivot(change, found):
-    """The true numbers, with the shift of the point about which the program turns."""
+    """The true numbers, with the shift of the point about which the program turns, before it turns."""
     true, about = dict(change["numbers"]), [f"about_{axis}_mm" for axis in "xyz"]
     if "shift_x_mm" not in true or about[0] not in found or "turn_x_deg" not in found:
         return true
     lever = np.array([found[name][0] for name in about]) - change["about_mm"]
     turn = Rotation.from_rotvec(np.radians([true[f"turn_{axis}_deg"] for axis in "xyz"]))
-    for axis, further in zip("xyz", turn.apply(lever) - lever):
-        true[f"shift_{axis}_mm"] += float(further)
-    return true
+    shift = np.array([true[f"shift_{axis}_mm"] for axis in "xyz"]) + turn.apply(lever) - lever
+    return true | numbers_of("shift", turn.inv().apply(shift), "mm")

@@ -54,9 +54,9 @@ fn estimator(radius: f64, stiffness: Option<f64>) -> ContactEstimator {
 }
 
 fn patcher_of(messages: &[Message], params: PatcherParams) -> Patcher {
+    let mut contacts = estimator(params.touches.radius, params.touches.stiffness);
     let mut patcher = Patcher::new(params).unwrap();
     let mut sync = Synchroniser::new(SyncParams::default()).unwrap();
-    let mut contacts = estimator(params.touches.radius, params.touches.stiffness);
     for message in messages {
         sync.push(*message);
         std::iter::from_fn(|| sync.next_sample())
@@ -372,7 +372,7 @@ fn errors_outside_of_the_model_are_not_in_the_stated_uncertainty() {
 fn what_the_calibration_leaves_is_in_every_vertex() {
     let (scan, touch, params) = touched_plate(&StylusParams::default(), 1);
     let sigmas = |radius: f64, place: f64, stiffness_share: f64| {
-        let mut params = params;
+        let mut params = params.clone();
         params.uncertainty.as_mut().unwrap().calibration = CalibrationParams {
             radius,
             place,
@@ -415,7 +415,7 @@ fn what_the_calibration_leaves_is_in_every_vertex() {
 #[test]
 fn only_new_vertices_are_better_known_than_the_scan_and_uncertainty_is_optional() {
     let (scan, touch, params) = touched_plate(&StylusParams::default(), 1);
-    let made = patched(&mut patcher_of(&touch.messages, params), &scan);
+    let made = patched(&mut patcher_of(&touch.messages, params.clone()), &scan);
     assert_eq!(made.sigma.len(), made.mesh.vertex_slots());
     for (sigma, support) in made.sigma.iter().zip(&made.support) {
         assert!(*support != Support::Scan || *sigma == 0.6e-3);
@@ -506,10 +506,10 @@ fn outliers_are_counted_and_do_not_dent_the_mesh() {
         let shaken = shaken_and_slipped(&touch.messages);
         let silent = PatcherParams {
             uncertainty: None,
-            ..params
+            ..params.clone()
         };
         let mut patchers = [
-            patcher_of(&touch.messages, params),
+            patcher_of(&touch.messages, params.clone()),
             patcher_of(&shaken, params),
             patcher_of(&shaken, silent),
         ];

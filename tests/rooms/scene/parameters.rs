@@ -25,6 +25,13 @@ markers.period_ms ms 1 0.05 10000
 markers.reorder_ms ms 20 0 60000
 scan_to_space.position_mm mm [0,0,0] -1e6 1e6
 scan_to_space.orientation_xyzw length [0,0,0,1] 0.999 1.001
+changes.from_s s - 0 9e9
+changes.to_s s - 0 9e9
+changes.shift_mm mm [0,0,0] -1000 1000
+changes.turn_deg degrees [0,0,0] -180 180
+changes.about_mm mm [0,0,0] -1e6 1e6
+changes.shift_sigma_mm mm [0,0,0] 0 1000
+changes.turn_sigma_deg degrees [0,0,0] 0 180
 compensation.sensor_position_mm mm [0,0,0] -100000 100000
 compensation.sensor_orientation_xyzw length - 0.999 1.001
 compensation.payload.mass_kg kg 0 0 1000
@@ -125,6 +132,7 @@ columns.orientation - -
 columns.force - -
 columns.torque - -
 columns.wrench_axes pose pose,tip
+changes.cause part_moved part_moved,tip_bent
 compensation.payload.gravity_axes object object,space
 tip.shape ball ball,flat,cone
 scan.file - -
@@ -148,12 +156,13 @@ refine.along - normal0,force
 ";
 
 /// The sections, and whether the default scene builds them.
-const SECTIONS: [(&str, bool); 20] = [
+const SECTIONS: [(&str, bool); 21] = [
     ("sync", true),
     ("columns", false),
     ("clock", true),
     ("markers", false),
     ("scan_to_space", false),
+    ("changes", false),
     ("compensation", false),
     ("compensation.payload", false),
     ("compensation.bias", false),
@@ -329,6 +338,8 @@ fn scene(key: &str, value: &str) -> String {
     let speeds =
         "link_mm_per_s: 0.1, search_mm_per_s: 0.1, measure_mm_per_s: 0.1, slide_mm_per_s: 0.1, ";
     let with = match key {
+        "changes.from_s" => "",
+        _ if section == "changes" => "from_s: 0, ",
         "contact.on_n" => "off_n: 0, ",
         "contact.off_n" => "on_n: 1000, ",
         "scan.region_low_mm" => "region_high_mm: [1e6, 1e6, 1e6], ",
@@ -343,11 +354,13 @@ fn scene(key: &str, value: &str) -> String {
         "markers.gate_mm" => "positions_mm: [[0, 0, 5000], [0, 5000, 0], [5000, 0, 0]], ",
         _ => "",
     };
-    let inner = section
-        .rsplit('.')
-        .fold(format!("{with}{name}: {value}"), |inner, name| {
-            format!("{name}: {{ {inner} }}")
-        });
+    let inner =
+        section
+            .rsplit('.')
+            .fold(format!("{with}{name}: {value}"), |inner, name| match name {
+                "changes" => format!("{name}: [{{ {inner} }}]"),
+                _ => format!("{name}: {{ {inner} }}"),
+            });
     // a ball of radius 0 has no patch
     let others = [("tip", ""), ("contact", ""), ("patch", "off")]
         .into_iter()
@@ -369,6 +382,9 @@ fn written(row: &Row, x: f64) -> String {
         "workspace_",
         "robot.arm_",
         "registered_at_mm",
+        "changes.shift",
+        "changes.turn",
+        "changes.about",
     ];
     match row.key {
         _ if row.unit == "length" => format!("[{x}, 0, 0, 0]"),

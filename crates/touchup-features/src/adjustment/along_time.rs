@@ -5,8 +5,10 @@ use nalgebra::Point3;
 use super::numbers::SessionNumbers;
 use super::pressed_surface::PressedSurface;
 use super::problem::{SessionProblem, SolvedSession};
-use super::session_change::{ChangeCause, ChangeCourse, SessionChange};
+use super::recorded_press::RecordedPress;
+use super::session_change::{ChangeCause, SessionChange};
 use touchup_geometry::numeric::mean;
+use touchup_method::stylus::ChangeCourse;
 
 /// Number of parts of a session between times of a change that are tried first, and number of parts
 /// of the time between two of these that are tried next, again and again.
@@ -101,7 +103,7 @@ impl<'a> ChangeSearch<'a> {
         let at_time = |time: usize| {
             let change = SessionChange {
                 cause,
-                course: ChangeCourse::At(presses[time].stamp_ns),
+                course: before(presses, time),
                 about,
             };
             let solved = solved(&self.problem, self.surfaces, Some(change))?;
@@ -153,11 +155,17 @@ fn solved(
     problem.solved(surfaces.to_vec(), problem.told)
 }
 
+/// A change in the middle between a press and the one before it.
+fn before(presses: &[RecordedPress], at: usize) -> ChangeCourse {
+    let [last, next] = [at.saturating_sub(1), at].map(|at| presses[at].stamp_ns);
+    ChangeCourse::At(next - next.saturating_sub(last) / 2)
+}
+
 fn changes(problem: &SessionProblem) -> impl Iterator<Item = SessionChange> {
     let presses = problem.presses;
     let about = Point3::from(mean(presses.iter().map(|press| press.centre.coords)));
     let stamp = |at: usize| presses[at.min(presses.len() - 1)].stamp_ns;
-    let at = |part: usize| ChangeCourse::At(stamp(part * presses.len() / CHANGE_PARTS));
+    let at = |part: usize| before(presses, part * presses.len() / CHANGE_PARTS);
     let drift = ChangeCourse::Between(stamp(0), stamp(presses.len()));
     let courses: Vec<ChangeCourse> = (1..CHANGE_PARTS).map(at).chain([drift]).collect();
     let causes = [

@@ -15,8 +15,8 @@ use super::force_fault::{FAULT_FREEDOMS, FaultNumbers, ForceFault, MeasuredForce
 use super::grouped_scores::GroupedScores;
 use super::problem::HALF_WEIGHT;
 use super::recorded_press::RecordedPress;
-use super::session_change::ChangeCourse;
 use touchup_geometry::numeric::{SIGMA_OF_MEDIAN, cauchy_cost, cauchy_weight, median};
+use touchup_method::stylus::ChangeCourse;
 
 /// Unknowns: those of the fault, and friction.
 const UNKNOWNS: usize = FAULT_FREEDOMS + 1;
@@ -31,7 +31,10 @@ const LEAST_NORMAL: f64 = 0.3;
 /// Maximum share of a way that lies along the normal.
 const STEEP: f64 = 0.5;
 /// Minimum number of strokes for each unknown.
-const STROKES_PER_UNKNOWN: usize = 2;
+const STROKES_PER_UNKNOWN: usize = 4;
+/// Minimum mean square of the normals along each direction in T, for gains: along one that no surface
+/// faces, a gain is another friction.
+const LEAST_FACING: f64 = 0.05;
 
 type ForceVector = SVector<f64, UNKNOWNS>;
 type ForceMatrix = SMatrix<f64, UNKNOWNS, UNKNOWNS>;
@@ -123,7 +126,9 @@ impl ForceAdjustment {
     pub(super) fn of(presses: &[SlidingPress]) -> Option<Self> {
         let sizes = presses.iter().map(|press| press.measured.force.norm());
         let largest = sizes.fold(0.0, f64::max);
-        let fits = faults(presses).filter_map(|fault| FaultFit::of(presses, fault, largest));
+        let is_faced = is_faced_from_all_sides(presses);
+        let faults = faults(presses).filter(|fault| is_faced || *fault != Some(ForceFault::Gains));
+        let fits = faults.filter_map(|fault| FaultFit::of(presses, fault, largest));
         let fits: Vec<FaultFit> = fits.filter(|fit| fit.is_possible(largest)).collect();
         let scale = fits.iter().map(|fit| fit.scale).min_by(f64::total_cmp)?;
         let alike = fits.iter().map(|fit| fit.alike).fold(1.0, f64::max);
@@ -149,6 +154,12 @@ impl ForceAdjustment {
             presses: presses.len(),
         })
     }
+}
+
+fn is_faced_from_all_sides(presses: &[SlidingPress]) -> bool {
+    let normals = presses.iter().map(|press| press.normal);
+    let squares: Matrix3<f64> = normals.map(|normal| normal * normal.transpose()).sum();
+    squares.symmetric_eigenvalues().min() > LEAST_FACING * squares.trace()
 }
 
 /// None, and all that compete.

@@ -1,8 +1,7 @@
 //! What may be wrong with a force, as unknowns.
 
 use nalgebra::{Matrix3, Rotation3, SMatrix, SVector, UnitQuaternion, Vector3};
-
-use super::session_change::ChangeCourse;
+use touchup_method::stylus::ChangeCourse;
 
 /// Most unknowns of a fault.
 pub(super) const FAULT_FREEDOMS: usize = 8;

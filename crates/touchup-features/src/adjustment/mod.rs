@@ -33,11 +33,11 @@ mod session_adjustment;
 mod session_change;
 
 pub(crate) use force_adjustment::ForceAdjustment;
-pub(crate) use force_fault::{ForceFault, without_trace};
+pub(crate) use force_fault::{FaultNumbers, ForceFault, without_trace};
 pub(crate) use numbers::SessionNumbers;
 pub(crate) use recorded_press::RecordedPress;
 pub(crate) use session_adjustment::{LikelyChange, SessionAdjustment};
-pub(crate) use session_change::{ChangeCause, ChangeCourse};
+pub(crate) use session_change::ChangeCause;
 
 #[cfg(test)]
 mod force_tests;

@@ -44,11 +44,12 @@ impl RecordedPress {
 
     /// Derivatives of a distance by the numbers of the session.
     ///
-    /// - `normal`: its gradient where the press was placed.
+    /// - `normal`: its gradient where the press was placed with these numbers.
     pub(super) fn by_numbers(
         &self,
         placed: &PlacedPress,
         normal: &Vector3<f64>,
+        session: &SessionNumbers,
         change: Option<&SessionChange>,
     ) -> SessionNumbers {
         let recorded = placed.turn.inverse_transform_vector(normal);
@@ -56,7 +57,10 @@ impl RecordedPress {
             compliance: self.force.dot(&recorded),
             offset_t: self.rotation.inverse_transform_vector(&recorded),
             change: change
-                .map(|change| change.by_size(self, &placed.centre, [normal, &recorded]))
+                .map(|change| {
+                    let placed = (&placed.centre, &session.change);
+                    change.by_size(self, placed, [normal, &recorded])
+                })
                 .unwrap_or_default(),
         }
     }

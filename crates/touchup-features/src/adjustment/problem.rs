@@ -96,7 +96,7 @@ impl SessionProblem<'_> {
     ) -> PressRow {
         let placed = press.placed(numbers, self.change.as_ref());
         let (distance, normal, by_surface) = surface.at(&placed.centre);
-        let by_numbers = press.by_numbers(&placed, &normal, self.change.as_ref());
+        let by_numbers = press.by_numbers(&placed, &normal, numbers, self.change.as_ref());
         PressRow {
             misfit: distance - self.radius,
             by_surface,

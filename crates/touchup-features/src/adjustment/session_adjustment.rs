@@ -9,7 +9,7 @@ use super::numbers::SessionNumbers;
 use super::pressed_surface::{PressedSurface, pressed_surfaces};
 use super::problem::{SessionProblem, SolvedSession};
 use super::recorded_press::RecordedPress;
-use super::session_change::SessionChange;
+use super::session_change::{ChangeCause, SessionChange};
 
 /// Number of rounds of surfaces found in the presses, as the session is known until then.
 const ROUNDS: usize = 2;
@@ -118,10 +118,10 @@ fn sliding_presses(problem: &SessionProblem, solved: &SolvedSession) -> Vec<Slid
 impl LikelyChange {
     /// - `fits`: the likeliest first. `change`: the first of them at its likeliest time.
     fn of(fits: &[ChangeFit], change: Option<SessionChange>) -> Option<Self> {
+        let cause = |fit: &ChangeFit| fit.change.map(|change| change.cause);
+        let changed = |fit: &ChangeFit| cause(fit).map(ChangeCause::changed);
         let best = fits.first()?;
-        let cause = best.change?.cause;
-        let is_like = |fit: &ChangeFit| fit.change.is_some_and(|other| cause.is_like(other.cause));
-        let other = fits.iter().find(|fit| !is_like(fit))?;
+        let other = fits.iter().find(|fit| changed(fit) != changed(best))?;
         Some(Self {
             change: change?,
             odds: best.likelihood - other.likelihood,

@@ -1,8 +1,9 @@
 //! What may change while a session lasts.
 
-use nalgebra::{Point3, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3, Vector6};
 
 use super::recorded_press::RecordedPress;
+use touchup_method::stylus::{ChangeCourse, ChangedThing, motion_about};
 
 /// What changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -15,15 +16,6 @@ pub(crate) enum ChangeCause {
     TipBent,
     /// The sink of the ball under a force, by a compliance.
     StiffnessChanged,
-}
-
-/// When it changes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum ChangeCourse {
-    /// All at once.
-    At(i64),
-    /// Evenly from one stamp to another.
-    Between(i64, i64),
 }
 
 /// A change, but for its size.
@@ -45,22 +37,12 @@ impl ChangeCause {
         }
     }
 
-    /// Whether both move the same thing.
-    pub(super) fn is_like(self, other: Self) -> bool {
-        let is_of_part = |cause| matches!(cause, Self::PartShifted | Self::PartMoved);
-        self == other || is_of_part(self) && is_of_part(other)
-    }
-}
-
-impl ChangeCourse {
-    /// Share of the change that has happened.
-    pub(super) fn share(self, stamp_ns: i64) -> f64 {
+    /// What changes its place; `None`: only how the ball sinks changes.
+    pub(crate) fn changed(self) -> Option<ChangedThing> {
         match self {
-            Self::At(at) => f64::from(stamp_ns >= at),
-            Self::Between(from, to) => {
-                let since = stamp_ns.saturating_sub(from) as f64;
-                (since / to.saturating_sub(from).max(1) as f64).clamp(0.0, 1.0)
-            }
+            Self::PartShifted | Self::PartMoved => Some(ChangedThing::Part),
+            Self::TipBent => Some(ChangedThing::Tip),
+            Self::StiffnessChanged => None,
         }
     }
 }
@@ -78,34 +60,38 @@ impl SessionChange {
         let size = size * self.course.share(press.stamp_ns);
         let [shift, turn]: [Vector3<f64>; 2] =
             [0, 3].map(|from| size.fixed_rows::<3>(from).into_owned());
-        match self.cause {
-            ChangeCause::PartShifted => (centre - shift, UnitQuaternion::identity()),
-            ChangeCause::PartMoved => {
-                let turn = UnitQuaternion::from_scaled_axis(-turn);
-                let moved = centre - self.about - shift;
-                (self.about + turn * moved, turn)
-            }
-            ChangeCause::TipBent => (centre + press.rotation * shift, UnitQuaternion::identity()),
-            ChangeCause::StiffnessChanged => {
-                (centre + press.force * shift.x, UnitQuaternion::identity())
-            }
-        }
+        let Some(changed) = self.cause.changed() else {
+            let sunk = centre + press.force * shift.x;
+            return (sunk, UnitQuaternion::identity());
+        };
+        let turn = match self.cause {
+            ChangeCause::PartMoved => turn,
+            _ => Vector3::zeros(),
+        };
+        let motion = motion_about(&self.about, &shift, &turn);
+        let recorded = Isometry3::from_parts(centre.coords.into(), press.rotation);
+        let undone = changed.undone(&motion, &recorded);
+        let turned = undone.rotation * press.rotation.inverse();
+        (undone.translation.vector.into(), turned)
     }
 
     /// Derivatives of a distance by the size of the change.
     ///
-    /// - `centre`: where the press was placed. `normal`: gradient of the distance there, and
-    ///   `recorded`, in the axes of the recording.
+    /// - `centre`: where the press was placed with this size. `normal`: gradient of the distance
+    ///   there, and `recorded`, in the axes of the recording.
     pub(super) fn by_size(
         &self,
         press: &RecordedPress,
-        centre: &Point3<f64>,
+        (centre, size): (&Point3<f64>, &Vector6<f64>),
         [normal, recorded]: [&Vector3<f64>; 2],
     ) -> Vector6<f64> {
         let share = self.course.share(press.stamp_ns);
         let (by_shift, by_turn) = match self.cause {
-            ChangeCause::PartShifted => (-recorded, Vector3::zeros()),
-            ChangeCause::PartMoved => (-recorded, -(centre - self.about).cross(normal)),
+            ChangeCause::PartShifted => (-normal, Vector3::zeros()),
+            ChangeCause::PartMoved => {
+                let lever = centre + size.fixed_rows::<3>(0) * share - self.about;
+                (-normal, -lever.cross(normal))
+            }
             ChangeCause::TipBent => (
                 press.rotation.inverse_transform_vector(recorded),
                 Vector3::zeros(),

@@ -5,8 +5,9 @@ use rand::rngs::SmallRng;
 use rand::{RngExt, SeedableRng};
 
 use super::session_change::SessionChange;
-use super::{ChangeCause, ChangeCourse, RecordedPress, SessionAdjustment, SessionNumbers};
+use super::{ChangeCause, RecordedPress, SessionAdjustment, SessionNumbers};
 use crate::features::fit::{Cylinder, SurfaceModel};
+use touchup_method::stylus::ChangeCourse;
 
 const RADIUS: f64 = 1.5e-3;
 /// Duration of a stroke.
@@ -195,7 +196,8 @@ fn a_part_that_moved_is_found_with_time_and_size() {
         // 0.02 mm of noise hide 0.05 mm along a normal in a press or two
         assert!(is_at(change.course, 39), "{change:?}");
         let off = change.about - about;
-        let shift = shift + (turn * off - off);
+        // in the axes of the part before it turned
+        let shift = turn.inverse() * (shift + (turn * off - off));
         let mut expected = Vector6::zeros();
         expected.fixed_rows_mut::<3>(0).copy_from(&shift);
         expected
@@ -311,7 +313,7 @@ fn derivatives_are_those_of_the_placed_press() {
             bore.distance_and_normal(&placed.centre)
         };
         let placed = press.placed(&at, Some(&change));
-        let by = press.by_numbers(&placed, &distance(&at).1, Some(&change));
+        let by = press.by_numbers(&placed, &distance(&at).1, &at, Some(&change));
         let (by, x) = (by.as_vector(), at.as_vector());
         for which in 0..x.len() {
             let step = if which == 0 { 1e-9 } else { 1e-7 };

@@ -4,6 +4,7 @@ use std::fmt;
 
 use serde::Serialize;
 
+use super::correction::InputCorrection;
 use touchup_method::names;
 
 names! {
@@ -122,6 +123,9 @@ pub struct InputFinding {
     pub numbers: Vec<FoundNumber>,
     /// remedy
     pub remedy: &'static str,
+    /// what takes it off; `None`: no setting does
+    #[serde(skip)]
+    pub correction: Option<InputCorrection>,
 }
 
 /// A number of a finding.
@@ -154,6 +158,7 @@ impl InputFinding {
             measured,
             numbers: Vec::new(),
             remedy,
+            correction: None,
         }
     }
 
@@ -173,6 +178,10 @@ impl InputFinding {
         )
     }
 
+    pub(super) fn corrected_by(self, correction: Option<InputCorrection>) -> Self {
+        Self { correction, ..self }
+    }
+
     pub(super) fn with(self, numbers: Vec<FoundNumber>) -> Self {
         Self { numbers, ..self }
     }
@@ -181,6 +190,10 @@ impl InputFinding {
 impl fmt::Display for InputFinding {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let how_sure = if self.is_sure { "" } else { "perhaps: " };
-        write!(f, "{how_sure}{}; {}", self.measured, self.remedy)
+        write!(f, "{how_sure}{}; {}", self.measured, self.remedy)?;
+        if self.is_sure && self.correction.is_some() {
+            write!(f, ", or take it off by touchup refine --accept")?;
+        }
+        Ok(())
     }
 }

@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use nalgebra::{Point3, Vector3};
 
+use super::correction::InputCorrection;
 use super::finding::{InputCause, InputFinding};
 use super::forces::{ForceLevels, NOISES, SensorWeight};
 use super::input_record::InputRecord;
@@ -127,20 +128,36 @@ impl InputJudge<'_> {
         let is_of_poses = |finding: &InputFinding| finding.cause.is_read_off_the_scan();
         let is_doubted_place = findings.iter().any(is_of_poses);
         let wrench = is_placed.then(|| self.judge_wrench(&presses)).flatten();
-        let is_turned = wrench.as_ref().is_some_and(|(_, is_turned)| *is_turned);
-        let mut wrench = wrench.map(|(finding, _)| finding);
         if let Some(few) = few {
+            let wrench = wrench.map(|(finding, _)| finding);
             let is_explained = is_doubted_place || wrench.is_some();
             findings.extend(if is_explained { wrench } else { Some(few) });
             return findings;
         }
+        self.judge_many(&presses, findings, wrench)
+    }
+
+    /// Doubts with enough places.
+    ///
+    /// - `findings`: of forces and places. `wrench`: another reading of it; whether it is a turn by any
+    ///   angle.
+    fn judge_many(
+        &self,
+        presses: &Presses,
+        mut findings: Vec<InputFinding>,
+        wrench: Option<(InputFinding, bool)>,
+    ) -> Vec<InputFinding> {
+        let is_of_poses = |finding: &InputFinding| finding.cause.is_read_off_the_scan();
+        let is_doubted_place = findings.iter().any(is_of_poses);
+        let is_turned = wrench.as_ref().is_some_and(|(_, is_turned)| *is_turned);
+        let mut wrench = wrench.map(|(finding, _)| finding);
         // forces in other axes select other presses, and show other surfaces
         let is_read = wrench.is_none() || is_turned;
         let is_first = |finding: &InputFinding| {
             finding.is_sure && !matches!(finding.cause, InputCause::Frame | InputCause::Tare)
         };
         let mut of_session = if is_read && !findings.iter().any(is_first) {
-            self.judge_session(&presses)
+            self.judge_session(presses)
         } else {
             Vec::new()
         };
@@ -166,7 +183,7 @@ impl InputJudge<'_> {
         }
         // a ball at another place looks like a scan at another one
         let registration = (is_read && of_session.is_empty())
-            .then(|| self.judge_registration(&presses))
+            .then(|| self.judge_registration(presses))
             .flatten();
         findings.extend(registration);
         // each of these changes the contacts, and the course of the force
@@ -183,7 +200,7 @@ impl InputJudge<'_> {
         // radius last: a wrong place or stiffness moves the centre as far
         let is_explained = wrench.is_some() || !of_session.is_empty() || is_doubted_place;
         let radius = (!is_explained)
-            .then(|| self.judge_radius(&presses))
+            .then(|| self.judge_radius(presses))
             .flatten();
         findings.extend(of_session);
         findings.extend(radius);
@@ -564,12 +581,13 @@ impl InputJudge<'_> {
     }
 
     fn judge_clock(&self) -> Option<InputFinding> {
+        let clock = self.clock?;
         let ClockOffset {
             offset,
             sigma,
             drift,
             evidence,
-        } = self.clock?;
+        } = clock;
         let largest = drift.map_or(offset.abs(), |of| {
             of.offset_at_first.abs().max(of.offset_at_last.abs())
         });
@@ -617,8 +635,10 @@ impl InputJudge<'_> {
             }
         };
         let is_sure = path > LARGEST_PATH;
-        (path > LARGEST_PATH / 2.0)
-            .then(|| InputFinding::new(InputCause::Delay, is_sure, measured, remedy))
+        (path > LARGEST_PATH / 2.0).then(|| {
+            InputFinding::new(InputCause::Delay, is_sure, measured, remedy)
+                .corrected_by(Some(InputCorrection::WrenchClock(clock)))
+        })
     }
 }
 

@@ -48,17 +48,16 @@ impl PlaceMend {
     }
 
     fn pose(&self, placement: &Placement, record: &InputRecord) -> Isometry3<f64> {
-        let recorded = placement.unplaced(&Isometry3::from_parts(
-            record.centre.into(),
-            record.rotation,
-        ));
+        let placed = Isometry3::from_parts(record.centre.into(), record.rotation);
+        let recorded = placement.unplaced(record.stamp_ns, &placed);
         let rotation = if self.is_w_first {
             w_first(&recorded.rotation)
         } else {
             recorded.rotation
         };
         let position = self.poses * recorded.translation.vector;
-        placement.placed(&Isometry3::from_parts(position.into(), rotation))
+        let mended = Isometry3::from_parts(position.into(), rotation);
+        placement.placed(record.stamp_ns, &mended)
     }
 
     /// w first in the quaternion.

@@ -6,6 +6,7 @@
 //! surface and a force along the surface's outward normal; in free motion it has no force. The
 //! monitor compares each violation with candidate corrections.
 
+mod correction;
 mod finding;
 mod forces;
 mod input_record;
@@ -23,6 +24,7 @@ mod shift;
 mod stamps;
 mod wrench;
 
+pub use correction::InputCorrection;
 pub use finding::{FoundNumber, InputCause, InputFinding};
 pub use monitor::InputMonitor;
 pub use monitor_params::InputMonitorParams;

@@ -101,11 +101,11 @@ impl InputMonitor {
         Ok(Self {
             compensator: Compensator::new(params.compensator)?,
             clock: ClockEstimator::new(params.tip.stiffness)?,
-            params,
             stamps: InputStamps::default(),
             poses: PoseCourse::default(),
             records: ThinnedRecords::default(),
             press: RecordMean::new(params.tip.radius),
+            params,
             presses: ThinnedRecords::default(),
             samples: 0,
             last_force: None,

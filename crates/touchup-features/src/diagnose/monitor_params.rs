@@ -5,7 +5,7 @@ use touchup_method::stylus::{
 };
 
 /// Assumptions about the input.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct InputMonitorParams {
     /// weight, constant bias, frames
     pub compensator: CompensatorParams,

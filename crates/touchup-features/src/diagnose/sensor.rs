@@ -1,11 +1,12 @@
 //! Findings about the sensor, from the directions of the forces of sliding presses.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Matrix3;
 
 use super::finding::{FoundNumber, InputCause, InputFinding};
 use super::judge::{InputJudge, Presses, TARE_REMEDY};
 use super::session::{CLEAR_ODDS, DOUBTED_SIGMAS, SURE_SIGMAS};
-use crate::adjustment::{ChangeCourse, ForceAdjustment, ForceFault, without_trace};
+use crate::adjustment::{FaultNumbers, ForceAdjustment, ForceFault, without_trace};
+use touchup_method::stylus::ChangeCourse;
 
 /// Standard uncertainty of a direction besides the scatter of strokes, rad: a friction that has a
 /// preferred direction, and the lateral bend of a stylus.
@@ -13,6 +14,7 @@ const OF_MODEL_LEAN: f64 = 0.02;
 const AXES_REMEDY: &str = "give the turn of the sensor (compensation.sensor_orientation_xyzw)";
 const GAINS_REMEDY: &str =
     "calibrate the sensor: its axes have other gains, or read into each other";
+const REZEROED_REMEDY: &str = "tare the sensor in free air and only there, and record it again";
 const GAINS: [&str; 8] = [
     "gain_xx", "gain_xy", "gain_xz", "gain_yx", "gain_yy", "gain_yz", "gain_zx", "gain_zy",
 ];
@@ -30,115 +32,131 @@ impl InputJudge<'_> {
         presses: &Presses,
         adjusted: &ForceAdjustment,
     ) -> Option<InputFinding> {
-        let fault = adjusted.fault;
-        let unit = if fault.is_of_zero() {
-            presses.levels.largest
-        } else {
-            1.0
-        };
-        let sigma = adjusted
-            .sigma
-            .map(|sigma| sigma.hypot(OF_MODEL_LEAN * unit));
-        let sizes = adjusted.found.iter().zip(&sigma).take(fault.freedoms());
-        let off = sizes.map(|(size, sigma)| size.abs() / sigma);
-        let off = off.fold(0.0, f64::max);
-        let size =
-            |from: usize| [0, 1, 2].map(|axis| [adjusted.found[from + axis], sigma[from + axis]]);
-        let in_words = |from: usize, unit: f64| {
-            size(from)
-                .map(|[value, sigma]| format!("{:.2} ± {:.2}", value * unit, sigma * unit))
-                .join(", ")
-        };
-        let degrees = 1f64.to_degrees();
-        let (cause, remedy, what) = match fault {
-            ForceFault::Turned => (
-                InputCause::WrenchFrame,
-                AXES_REMEDY,
-                format!("the sensor is turned by ({}) °", in_words(0, degrees)),
-            ),
-            ForceFault::Gains => (
-                InputCause::ForceGains,
-                GAINS_REMEDY,
-                format!(
-                    "its axes are, of those that are read, {}",
-                    axes_of(&(Matrix3::identity() + without_trace(&adjusted.found)))
-                ),
-            ),
-            ForceFault::Zero => (
-                InputCause::Tare,
-                TARE_REMEDY,
-                format!("the zero of the sensor is off by ({}) N", in_words(0, 1.0)),
-            ),
-            ForceFault::ZeroChanged(course) => (
-                InputCause::Tare,
-                "tare the sensor in free air and only there, and record it again",
-                format!(
-                    "{} the zero of the sensor is off by ({}) N more",
-                    self.course_in_words(course),
-                    in_words(3, 1.0)
-                ),
-            ),
-            ForceFault::Weight => (
-                InputCause::Tare,
-                TARE_REMEDY,
-                format!("a weight of ({}) N is in the force", in_words(3, 1.0)),
-            ),
-        };
+        let sized = self.sized_fault(presses, adjusted);
+        let (cause, remedy, what) = self.fault_in_words(&sized);
         let measured = format!(
             "the directions of the forces of {} sliding presses agree if {what}",
             adjusted.presses
         );
+        let off = sized.sigmas_off();
         let is_clear = adjusted.odds.iter().all(|odds| *odds > CLEAR_ODDS);
         (is_clear && off > DOUBTED_SIGMAS).then(|| {
-            let numbers = self.force_numbers(presses, adjusted, &size);
+            let numbers = self.fault_numbers(&sized);
             InputFinding::new(cause, off > SURE_SIGMAS, measured, remedy).with(numbers)
         })
     }
 
-    /// - `size`: three values and their standard uncertainties from one on.
-    fn force_numbers(
-        &self,
-        presses: &Presses,
-        adjusted: &ForceAdjustment,
-        size: &dyn Fn(usize) -> [[f64; 2]; 3],
-    ) -> Vec<FoundNumber> {
-        let named = |names: &[&'static str], from: usize, unit: f64| -> Vec<FoundNumber> {
-            let sized = names.iter().zip(size(from));
-            sized
-                .map(|(name, [value, sigma])| FoundNumber::new(name, value * unit, sigma * unit))
-                .collect()
+    /// The fault beside the uncertainty of the model, and a zero with what is taken off already.
+    fn sized_fault(&self, presses: &Presses, adjusted: &ForceAdjustment) -> SizedFault {
+        let ForceAdjustment {
+            fault,
+            mut found,
+            sigma,
+            ..
+        } = *adjusted;
+        let levels = &presses.levels;
+        let unit = if fault.is_of_zero() {
+            levels.largest
+        } else {
+            1.0
         };
-        match adjusted.fault {
-            ForceFault::Turned => named(&TURNS, 0, 1f64.to_degrees()),
+        if fault == ForceFault::Zero {
+            for (zero, rest) in found.iter_mut().zip(&levels.rest_t) {
+                *zero += rest;
+            }
+        }
+        SizedFault {
+            fault,
+            found,
+            sigma: sigma.map(|sigma| sigma.hypot(OF_MODEL_LEAN * unit)),
+        }
+    }
+
+    /// Cause, remedy, and what is wrong.
+    fn fault_in_words(&self, sized: &SizedFault) -> (InputCause, &'static str, String) {
+        let zero = InputCause::Tare;
+        match sized.fault {
+            ForceFault::Turned => {
+                let turn = sized.in_words(0, 1f64.to_degrees());
+                let what = format!("the sensor is turned by ({turn}) °");
+                (InputCause::WrenchFrame, AXES_REMEDY, what)
+            }
             ForceFault::Gains => {
-                let gains = adjusted.found.iter().zip(&adjusted.sigma);
-                let gains = GAINS.into_iter().zip(gains);
-                gains
-                    .map(|(name, (value, sigma))| FoundNumber::new(name, *value, *sigma))
-                    .collect()
+                let axes = axes_of(&(Matrix3::identity() + without_trace(&sized.found)));
+                let what = format!("its axes are, of those that are read, {axes}");
+                (InputCause::ForceGains, GAINS_REMEDY, what)
             }
             ForceFault::Zero => {
-                let mut zero = named(&BIASES, 0, 1.0);
-                for (number, rest) in zero.iter_mut().zip(&presses.levels.rest_t) {
-                    number.value += rest;
-                }
-                zero
+                let bias = sized.in_words(0, 1.0);
+                let what = format!("the zero of the sensor is off by ({bias}) N");
+                (zero, TARE_REMEDY, what)
             }
             ForceFault::ZeroChanged(course) => {
-                let mut change = named(&BIASES, 3, 1.0);
+                let (when, bias) = (self.course_in_words(course), sized.in_words(3, 1.0));
+                let what = format!("{when} the zero of the sensor is off by ({bias}) N more");
+                (zero, REZEROED_REMEDY, what)
+            }
+            ForceFault::Weight => {
+                let weight = sized.in_words(3, 1.0);
+                let what = format!("a weight of ({weight}) N is in the force");
+                (zero, TARE_REMEDY, what)
+            }
+        }
+    }
+
+    fn fault_numbers(&self, sized: &SizedFault) -> Vec<FoundNumber> {
+        match sized.fault {
+            ForceFault::Turned => sized.named(&TURNS, 0, 1f64.to_degrees()),
+            ForceFault::Gains => sized.named(&GAINS, 0, 1.0),
+            ForceFault::Zero => sized.named(&BIASES, 0, 1.0),
+            ForceFault::ZeroChanged(course) => {
+                let mut change = sized.named(&BIASES, 3, 1.0);
                 if let ChangeCourse::At(at) = course {
                     change.push(FoundNumber::new("at_s", self.since_first(at), 0.0));
                 }
                 change
             }
             ForceFault::Weight => {
-                let [x, y, z] = size(3);
-                let weight = Vector3::new(x[0], y[0], z[0]);
-                let sigma = Vector3::new(x[1], y[1], z[1]);
+                let [weight, sigma] =
+                    [&sized.found, &sized.sigma].map(|of| of.fixed_rows::<3>(3).into_owned());
                 let along = weight.normalize().component_mul(&sigma);
                 vec![FoundNumber::new("weight_n", weight.norm(), along.norm())]
             }
         }
+    }
+}
+
+/// A fault with all that its size and uncertainty contain.
+struct SizedFault {
+    fault: ForceFault,
+    found: FaultNumbers,
+    sigma: FaultNumbers,
+}
+
+impl SizedFault {
+    /// Largest number in its standard uncertainty.
+    fn sigmas_off(&self) -> f64 {
+        let sizes = self.found.iter().zip(&self.sigma);
+        let off = sizes.map(|(size, sigma)| size.abs() / sigma);
+        off.take(self.fault.freedoms()).fold(0.0, f64::max)
+    }
+
+    /// Three numbers from one on, in a unit.
+    fn in_words(&self, from: usize, unit: f64) -> String {
+        let words = [from, from + 1, from + 2].map(|at| {
+            let (value, sigma) = (self.found[at] * unit, self.sigma[at] * unit);
+            format!("{value:.2} ± {sigma:.2}")
+        });
+        words.join(", ")
+    }
+
+    /// Numbers from one on, in a unit.
+    fn named(&self, names: &[&'static str], from: usize, unit: f64) -> Vec<FoundNumber> {
+        let sizes = self.found.iter().zip(&self.sigma).skip(from);
+        let named = names.iter().zip(sizes);
+        named
+            .map(|(name, (value, sigma))| FoundNumber::new(name, value * unit, sigma * unit))
+            .collect()
     }
 }
 

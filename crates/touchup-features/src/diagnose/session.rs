@@ -1,15 +1,16 @@
 //! What a session is made with, and what changed while it lasted: told against what the presses
 //! show among themselves.
 
-use nalgebra::{Vector3, Vector6};
+use nalgebra::Vector3;
 
+use super::correction::{ANY, InputCorrection, is_known};
 use super::finding::{FoundNumber, InputCause, InputFinding};
 use super::input_record::InputRecord;
 use super::judge::{InputJudge, Presses};
 use crate::adjustment::{
-    ChangeCause, ChangeCourse, LikelyChange, RecordedPress, SessionAdjustment, SessionNumbers,
+    ChangeCause, LikelyChange, RecordedPress, SessionAdjustment, SessionNumbers,
 };
-use touchup_method::stylus::{TipParams, TipShape};
+use touchup_method::stylus::{ChangeCourse, TipParams, TipShape};
 
 /// Longest pause within a stroke, ns, and its longest duration, in which presses share their errors:
 /// slow wander of a tracker.
@@ -19,12 +20,6 @@ const LONGEST_STROKE_NS: i64 = 1_000_000_000;
 /// length, m.
 const COURSE_REACH: isize = 2;
 const LEAST_COURSE: f64 = 0.3e-3;
-/// Standard uncertainties before the presses: whatever they show.
-const ANY: SessionNumbers = SessionNumbers {
-    compliance: 1e-3,
-    offset_t: Vector3::new(10e-3, 10e-3, 10e-3),
-    change: Vector6::new(10e-3, 10e-3, 10e-3, 0.2, 0.2, 0.2),
-};
 /// Standard uncertainty of the sink under the largest force, and of places, besides the scatter of
 /// strokes, m: what friction and lateral bend of a stylus look like.
 const OF_MODEL: f64 = 0.02e-3;
@@ -52,12 +47,14 @@ impl InputJudge<'_> {
         if self.params.shape != TipShape::Ball {
             return Vec::new();
         }
-        let told = SessionNumbers {
-            compliance: stiffness.map_or(0.0, f64::recip),
+        let told = stiffness.map_or(0.0, f64::recip);
+        // what no stylus has says nothing
+        let start = SessionNumbers {
+            compliance: if told < ANY.compliance { told } else { 0.0 },
             ..SessionNumbers::default()
         };
         let recorded = self.recorded_presses(presses);
-        let Some(mut adjusted) = SessionAdjustment::of(&recorded, radius, told, ANY) else {
+        let Some(mut adjusted) = SessionAdjustment::of(&recorded, radius, start, ANY) else {
             return Vec::new();
         };
         let extent = presses.scale.extent;
@@ -83,7 +80,7 @@ impl InputJudge<'_> {
         if let Some(change) = change {
             return [change].into_iter().chain(force).collect();
         }
-        let stiffness = stiffness_finding(&adjusted, told.compliance, self.params.stiffness_share);
+        let stiffness = stiffness_finding(&adjusted, told, self.params.stiffness_share);
         let place = place_finding(&adjusted, self.params.place_sigma);
         force.into_iter().chain(stiffness).chain(place).collect()
     }
@@ -124,37 +121,61 @@ impl InputJudge<'_> {
         likely: &LikelyChange,
     ) -> Option<InputFinding> {
         let cause = likely.change.cause;
-        let [shift, turn] =
-            [(0, 1e3, "mm"), (3, 1f64.to_degrees(), "°")].map(|(from, unit, name)| {
-                [0, 1, 2]
-                    .map(|axis| SizeFound {
-                        value: adjusted.found.change[from + axis] * unit,
-                        sigma: adjusted.sigma.change[from + axis] * unit,
-                        known: adjusted.sigma.change[from + axis] < 0.5 * ANY.change[from + axis],
-                    })
-                    .in_words(name)
-            });
         let sizes = adjusted.found.change.iter().zip(&adjusted.sigma.change);
         let off = sizes.take(cause.freedoms());
         let off = off
             .map(|(size, sigma)| size.abs() / sigma)
             .fold(0.0, f64::max);
+        let (cause, what, remedy) = self.change_in_words(adjusted, likely);
+        let measured = format!(
+            "{what}: {} presses on {} surfaces agree then",
+            adjusted.presses, adjusted.surfaces
+        );
+        let is_possible = off > DOUBTED_SIGMAS && likely.odds > CLEAR_ODDS;
+        let is_sure = off > SURE_SIGMAS;
+        is_possible.then(|| {
+            let numbers = self.change_numbers(adjusted, likely);
+            let correction = InputCorrection::of_change(likely, [&adjusted.found, &adjusted.sigma]);
+            InputFinding::new(cause, is_sure, measured, remedy)
+                .with(numbers)
+                .corrected_by(correction)
+        })
+    }
+
+    /// Cause, what changed and when, and remedy.
+    fn change_in_words(
+        &self,
+        adjusted: &SessionAdjustment,
+        likely: &LikelyChange,
+    ) -> (InputCause, String, &'static str) {
+        let sizes = [(0, 1e3, "mm"), (3, 1f64.to_degrees(), "°")];
+        let [shift, turn] = sizes.map(|(from, unit, name)| {
+            [from, from + 1, from + 2]
+                .map(|at| SizeFound {
+                    value: adjusted.found.change[at] * unit,
+                    sigma: adjusted.sigma.change[at] * unit,
+                    known: is_known(adjusted.sigma.change[at], ANY.change[at]),
+                })
+                .in_words(name)
+        });
         let when = self.course_in_words(likely.change.course);
         let about = likely.change.about * 1e3;
         let turned = format!(
             ", turned by {turn} about ({:.1}, {:.1}, {:.1}) mm",
             about.x, about.y, about.z
         );
-        let turned = if cause == ChangeCause::PartMoved {
-            &turned
-        } else {
-            ""
-        };
-        let (cause, what, remedy) = match cause {
-            ChangeCause::PartShifted | ChangeCause::PartMoved => (
+        let clamp =
+            "clamp the part, see that the tracker does not start again, and record it again";
+        match likely.change.cause {
+            ChangeCause::PartShifted => (
+                InputCause::PartMoved,
+                format!("{when} the part lies {shift} further"),
+                clamp,
+            ),
+            ChangeCause::PartMoved => (
                 InputCause::PartMoved,
                 format!("{when} the part lies {shift} further{turned}"),
-                "clamp the part, see that the tracker does not start again, and record it again",
+                clamp,
             ),
             ChangeCause::TipBent => (
                 InputCause::TipBent,
@@ -170,17 +191,7 @@ impl InputJudge<'_> {
                 ),
                 "tighten the tip in its holder, and record the part again",
             ),
-        };
-        let measured = format!(
-            "{what}: {} presses on {} surfaces agree then",
-            adjusted.presses, adjusted.surfaces
-        );
-        let is_possible = off > DOUBTED_SIGMAS && likely.odds > CLEAR_ODDS;
-        let is_sure = off > SURE_SIGMAS;
-        is_possible.then(|| {
-            let numbers = self.change_numbers(adjusted, likely);
-            InputFinding::new(cause, is_sure, measured, remedy).with(numbers)
-        })
+        }
     }
 
     pub(super) fn since_first(&self, stamp_ns: i64) -> f64 {
@@ -316,6 +327,7 @@ fn stiffness_finding(
         let number = FoundNumber::new("compliance_mm_per_n", found * 1e3, sigma * 1e3);
         InputFinding::new(InputCause::Stiffness, off > SURE_SIGMAS, measured, remedy)
             .with(vec![number])
+            .corrected_by(InputCorrection::of_compliance(found, sigma))
     })
 }
 
@@ -337,5 +349,6 @@ fn place_finding(adjusted: &SessionAdjustment, of_told: f64) -> Option<InputFind
             .map(|(name, (found, sigma))| FoundNumber::new(name, found * 1e3, sigma * 1e3));
         InputFinding::new(InputCause::TipOffset, off > SURE_SIGMAS, measured, remedy)
             .with(numbers.collect())
+            .corrected_by(Some(InputCorrection::of_place(found, sigma)))
     })
 }

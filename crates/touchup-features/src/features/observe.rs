@@ -402,15 +402,24 @@ pub(super) fn fit_params(systematic: [f64; 2], noise: TouchNoise) -> FitParams {
     }
 }
 
-/// As [`SegmentTouches::systematic`].
+/// As [`SegmentTouches::systematic`]: a displacement of some of the touches against the others, by
+/// what changed between them, is in the sizes.
 pub(super) fn systematic<'a>(touches: impl Iterator<Item = &'a ProbedPoint>) -> [f64; 2] {
-    let (sum, count) = touches.fold(([0.0; 2], 0.0f64), |([common, shift], count), touch| {
-        (
-            [common + touch.calibration, shift + touch.place],
-            count + 1.0,
-        )
-    });
-    sum.map(|sum| sum / count.max(1.0))
+    let (sums, count) = touches.fold(
+        ([0.0; 3], 0.0f64),
+        |([common, shift, square], count), touch| {
+            let ProbedPoint {
+                calibration, place, ..
+            } = *touch;
+            (
+                [common + calibration, shift + place, square + place * place],
+                count + 1.0,
+            )
+        },
+    );
+    let [common, shift, square] = sums.map(|sum| sum / count.max(1.0));
+    let spread = (square - shift * shift).max(0.0).sqrt();
+    [common.hypot(spread), shift]
 }
 
 /// Points of a segment, spread over its faces.
@@ -517,11 +526,8 @@ pub(super) fn groups(touches: &[ProbedPoint]) -> Vec<u32> {
 mod tests {
     use super::*;
 
-    /// Stamps in ms and strokes; the third touch begins a group of its own, and the second stroke
-    /// another one within the same tenth of a second.
-    #[test]
-    fn numbers_of_groups_tell_their_time() {
-        let touch = |(ms, stroke): (i64, u32)| ProbedPoint {
+    fn touch((ms, stroke): (i64, u32)) -> ProbedPoint {
+        ProbedPoint {
             stamp_ns: 7_000_000_000 + ms * 1_000_000,
             stroke,
             centre: Point3::origin(),
@@ -533,7 +539,32 @@ mod tests {
             place: 0.0,
             weight: 1.0,
             is_rejected: false,
+        }
+    }
+
+    /// Half of the touches displaced by ± 4 µm against the others, or all of them.
+    #[test]
+    fn a_displacement_between_touches_is_in_their_sizes() {
+        let of = |places: [f64; 4]| {
+            let touches = places.map(|place| ProbedPoint {
+                calibration: 1e-6,
+                place: place * 1e-6,
+                ..touch((0, 0))
+            });
+            systematic(touches.iter()).map(|sigma| sigma * 1e6)
         };
+        let is = |found: [f64; 2], expected: [f64; 2]| {
+            let off = [0, 1].map(|at| (found[at] - expected[at]).abs());
+            assert!(off[0].max(off[1]) < 1e-9, "{found:?}");
+        };
+        is(of([0.0, 0.0, 4.0, 4.0]), [5f64.sqrt(), 2.0]);
+        is(of([4.0; 4]), [1.0, 4.0]);
+    }
+
+    /// Stamps in ms and strokes; the third touch begins a group of its own, and the second stroke
+    /// another one within the same tenth of a second.
+    #[test]
+    fn numbers_of_groups_tell_their_time() {
         let touches = [
             (0, 0),
             (99, 0),

@@ -47,7 +47,7 @@ pub use markers::{
     SpringParams,
 };
 pub use moving_frame::MovingFrame;
-pub use placement::Placement;
+pub use placement::{ChangeCourse, ChangedThing, KnownChange, Placement, motion_about};
 pub use probed::ProbedPoint;
 pub use sync::Synchroniser;
 pub use sync_params::{SyncCounts, SyncParams};

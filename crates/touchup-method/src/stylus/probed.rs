@@ -25,7 +25,8 @@ pub struct ProbedPoint {
     pub sigma: f64,
     /// standard deviation from the calibration of radius and stiffness, the same in each touch, m
     pub calibration: f64,
-    /// standard deviation from the scan position, the same displacement in each touch, m
+    /// standard deviation from the scan position and from what was taken off, the same displacement
+    /// in each touch after it, m
     pub place: f64,
     /// weight beside other touches, at most 1
     pub weight: f64,

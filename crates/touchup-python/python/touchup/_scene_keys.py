@@ -111,6 +111,40 @@ class ScanToSpace(TypedDict, total=False):
     quaternion)] 0.999 to 1.001; default `[0, 0, 0, 1]`"""
 
 
+class Changes(TypedDict, total=False):
+    """What changed its place while the recording lasted (`touchup doctor`), one after the other: taken off the
+    poses. A change lasts until the end of the recording. Not named: nothing moved but the stylus."""
+
+    cause: Literal["part_moved", "tip_bent"]
+    """What changed its place: the part or the frame of the recorded poses, or the ball on the stylus.; default
+    `part_moved`"""
+
+    from_s: float
+    """Time of the change, or of its beginning, as the stamps of the poses have it. — [s] 0 to 9e+09"""
+
+    to_s: float
+    """End of a slow change, which goes on evenly until then; left out: all at once. — [s] 0 to 9e+09"""
+
+    shift_mm: list[float]
+    """Shift: of a part before it turns, in the axes of the scan; of a tip in the axes of the stylus. — [mm]
+    -1000 to 1000; default `[0, 0, 0]`"""
+
+    turn_deg: list[float]
+    """Turn of a part about about_mm, as a rotation vector in the axes of the scan. — [degrees] -180 to 180;
+    default `[0, 0, 0]`"""
+
+    about_mm: list[float]
+    """Centre of the turn, in the frame of the scan. — [mm] -1e+06 to 1e+06; default `[0, 0, 0]`"""
+
+    shift_sigma_mm: list[float]
+    """Standard uncertainty of the shift along each axis; the touches after the change contain it. — [mm] 0 to
+    1000; default `[0, 0, 0]`"""
+
+    turn_sigma_deg: list[float]
+    """Standard uncertainty of the turn about each axis; the touches after the change contain it. — [degrees] 0
+    to 180; default `[0, 0, 0]`"""
+
+
 class CompensationPayload(TypedDict, total=False):
     """Payload of the sensor: everything beyond its measuring plane."""
 
@@ -609,6 +643,10 @@ class Scene(TypedDict, total=False):
     scan_to_space: ScanToSpace | Literal[False, "off"] | None
     """Pose of the scan in the frame of the recorded poses: p_space = R p_scan + t (`touchup calibrate scan`).
     Not named: the poses are in the frame of the scan."""
+
+    changes: list[Changes]
+    """What changed its place while the recording lasted (`touchup doctor`), one after the other: taken off the
+    poses. A change lasts until the end of the recording. Not named: nothing moved but the stylus."""
 
     compensation: Compensation | Literal[False, "off"] | None
     """Subtraction of weight and bias from the wrench (`touchup calibrate payload`). Not named: the driver of

@@ -57,7 +57,10 @@ fn refined(
     placement.iter().try_for_each(Placement::check)?;
     let mut sync = Synchroniser::new(scene.sync_params())?;
     for message in messages {
-        sync.push(placement.map_or(*message, |placement| placement.place(*message, frame)));
+        let placed = placement
+            .as_ref()
+            .map_or(*message, |placement| placement.place(*message, frame));
+        sync.push(placed);
         std::iter::from_fn(|| sync.next_sample())
             .try_for_each(|sample| engine.push(&sample).map(drop))?;
     }

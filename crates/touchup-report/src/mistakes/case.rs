@@ -60,7 +60,9 @@ fn findings(mut scene: Scene, told: &ToldRecording) -> MeasureResult<Vec<InputFi
         }
     };
     for message in &told.messages {
-        let message = placement.map_or(*message, |placement| placement.place(*message, frame));
+        let message = placement
+            .as_ref()
+            .map_or(*message, |placement| placement.place(*message, frame));
         monitor.message(&message);
         sync.push(message);
         take(&mut sync, &mut monitor);

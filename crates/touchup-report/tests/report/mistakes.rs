@@ -14,6 +14,7 @@ fn finding(cause: InputCause, is_sure: bool) -> InputFinding {
         measured: "measured".to_owned(),
         numbers: Vec::new(),
         remedy: "do",
+        correction: None,
     }
 }
 

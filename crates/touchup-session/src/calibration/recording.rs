@@ -59,6 +59,8 @@ impl CalibrationRecording {
         let markers = marker_filter(scene, self.markers_topic.as_deref())?;
         let placement = scene.placement().map(|placement| Placement {
             pose_wo: None,
+            // of another recording
+            changes: Vec::new(),
             ..placement
         });
         each_sample(

@@ -144,7 +144,7 @@ impl Engine {
         };
         let (working, detail) = Detail::of(mesh, shared, &mut refine).map_err(RefineError::from)?;
         let mut refiner = Refiner::new(working, refine)?;
-        let patch_params = patch.filter(|_| shared.is_some());
+        let patch_params = patch.clone().filter(|_| shared.is_some());
         let patch = match (patch.map(Patcher::new).transpose()?, renewal) {
             (None, _) => Reconstruction::Without,
             (Some(patcher), Renewal::AtEnd) => Reconstruction::AtEnd(Box::new(patcher)),
@@ -375,7 +375,7 @@ impl Engine {
     /// # Errors
     /// [`LiveError::Stopped`], [`LiveError::Refine`], [`LiveError::Setting`].
     pub fn begin_replay(&mut self) -> Result<Option<EvidenceReplay>, LiveError> {
-        let Some(patch) = self.patch_params else {
+        let Some(patch) = self.patch_params.clone() else {
             return Ok(None);
         };
         self.follow()?;

@@ -31,11 +31,13 @@ use touchup_method::stylus::{
     ContactSample, FrictionCoefficient, MarkerFilter, Message, Sample, SettingError, WrenchFrame,
 };
 
+mod accepted;
 mod offsets;
 mod pace;
 mod summary;
 mod watch;
 
+pub use accepted::{AcceptedFinding, AcceptedScene};
 pub use offsets::{ScanOffset, WrenchOffset};
 pub use pace::LiveSummary;
 pub use summary::RefinementSummary;

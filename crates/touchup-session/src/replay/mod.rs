@@ -254,7 +254,10 @@ pub fn each_sample(
     let wrench_frame = recording.wrench_frame;
     let mut replayed = each_message(recording, markers, at_each, |message| {
         at_message(&message);
-        sync.push(placement.map_or(message, |placement| placement.place(message, wrench_frame)));
+        let placed = placement
+            .as_ref()
+            .map_or(message, |placement| placement.place(message, wrench_frame));
+        sync.push(placed);
         std::iter::from_fn(|| sync.next_sample()).for_each(|sample| each(&sample));
     })?;
     sync.finish();

@@ -88,7 +88,7 @@ impl Scene {
     }
 
     /// Parts of the scene, each with the reason if it is inactive.
-    fn reasons(&self) -> [(&'static str, Option<&'static str>); 17] {
+    fn reasons(&self) -> [(&'static str, Option<&'static str>); 18] {
         let not_robust = match &self.refine {
             None => Some(NOTHING_MOVES),
             Some(refine) => unless(refine.mode == Mode::Robust, PUBLISHED),
@@ -102,6 +102,7 @@ impl Scene {
                 "scan_to_space",
                 unless(self.scan_to_space.is_some(), NOT_NAMED),
             ),
+            ("changes", unless(!self.changes.is_empty(), NOT_NAMED)),
             (
                 "compensation",
                 unless(self.compensation.is_some(), NOT_NAMED),

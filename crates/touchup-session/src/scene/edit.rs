@@ -6,6 +6,7 @@
 mod block;
 mod flow;
 
+use std::fmt;
 use std::path::Path;
 
 use touchup_method::parameters::{Unit, Value};
@@ -60,6 +61,18 @@ impl Setting {
     }
 }
 
+/// YAML on one line, with its sections in braces.
+impl fmt::Display for Setting {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (sections, key) = self.path.rsplit_once('.').unwrap_or(("", self.path));
+        let sections: Vec<&str> = sections.split_terminator('.').collect();
+        sections
+            .iter()
+            .try_for_each(|section| write!(f, "{section}: {{ "))?;
+        write!(f, "{key}: {}{}", self.value, " }".repeat(sections.len()))
+    }
+}
+
 impl Scene {
     /// Sets keys, unchecked ([`Self::validate`]); a part that is off gets its defaults.
     ///
@@ -79,7 +92,8 @@ impl Scene {
     /// The text of a scene with `settings` in it.
     ///
     /// - `yaml`: the earlier text; empty for a new scene.
-    /// - `remark`: comment after the first edited key, unless the user has one there; one line.
+    /// - `remark`: comment after the first edited key, unless the user has one there; one line, or
+    ///   empty for none.
     ///
     /// # Errors
     /// Those of [`Self::from_yaml`] and [`Self::set`]; [`SceneError::CannotEdit`] if the new text
@@ -98,7 +112,7 @@ impl Scene {
         let mut text = yaml.to_owned();
         for (i, Setting { path, value }) in settings.iter().enumerate() {
             let keys: Vec<&str> = path.split('.').collect();
-            let remark = if i == 0 {
+            let remark = if i == 0 && !remark.is_empty() {
                 format!("  {} {remark}", block::MARK)
             } else {
                 String::new()

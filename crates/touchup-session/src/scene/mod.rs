@@ -7,6 +7,7 @@
 
 mod arm_check;
 mod built;
+mod correction;
 mod edit;
 mod error;
 mod params;
@@ -36,7 +37,8 @@ use touchup_method::haptic::{CarveParams, GuardParams};
 use touchup_method::parameters;
 use touchup_method::reconstruct::{PatchParams, UncertaintyParams};
 use touchup_method::stylus::{
-    BiasParams, ContactGateParams, SlidingParams, SyncParams, TipBody, TipParams, TipShape,
+    BiasParams, ContactGateParams, KnownChange, SlidingParams, SyncParams, TipBody, TipParams,
+    TipShape,
 };
 
 parameters! {
@@ -64,6 +66,10 @@ parameters! {
         /// Pose of the scan in the frame of the recorded poses: p_space = R p_scan + t (`touchup
         /// calibrate scan`). Not named: the poses are in the frame of the scan.
         scan_to_space: Option<ScanToSpaceSection> = None, "scan_to_space";
+        /// What changed its place while the recording lasted (`touchup doctor`), one after the other:
+        /// taken off the poses. A change lasts until the end of the recording. Not named: nothing
+        /// moved but the stylus.
+        changes: Vec<KnownChange> = Vec::new(), "changes";
         /// Subtraction of weight and bias from the wrench (`touchup calibrate payload`). Not named:
         /// the driver of the sensor subtracts them, and the sensor has the axes of the tip.
         compensation: Option<CompensationSection> = None, "compensation";
@@ -178,6 +184,30 @@ impl Scene {
         Some((folder.join(scan.file.as_ref()?), scan.unit))
     }
 
+    /// The files that the scene names, as settings for a scene in another folder.
+    ///
+    /// - `folder`: of this scene.
+    ///
+    /// # Errors
+    /// Those of [`Setting::file`].
+    pub fn files_in(&self, folder: &Path) -> Result<Vec<Setting>, SceneError> {
+        let robot = self.robot.as_ref();
+        let files = [
+            (
+                "scan.file",
+                self.scan.as_ref().and_then(|scan| scan.file.as_ref()),
+            ),
+            ("robot.urdf", robot.and_then(|robot| robot.urdf.as_ref())),
+            ("robot.check", robot.and_then(|robot| robot.check.as_ref())),
+        ];
+        let named = files
+            .into_iter()
+            .filter_map(|(key, file)| Some((key, file?)));
+        named
+            .map(|(key, file)| Setting::file(key, &folder.join(file)))
+            .collect()
+    }
+
     /// Parses and checks a scene.
     ///
     /// # Errors
@@ -227,6 +257,8 @@ impl Scene {
             true => Ok(()),
             false => Err(SceneError::Incomplete { key, needs }),
         };
+        let are_timed = self.changes.iter().all(|change| change.from.is_some());
+        require(are_timed, "changes", "changes.from_s in each of them")?;
         if let Some(tip) = &self.tip {
             let is_cone = tip.shape == ShapeName::Cone;
             let has_angle = tip.sizes.half_angle.is_some();

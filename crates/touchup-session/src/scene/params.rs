@@ -36,7 +36,12 @@ impl Scene {
     pub fn placement(&self) -> Option<Placement> {
         let pose_wo = self.scan_to_space.as_ref().map(ScanToSpaceSection::pose_wo);
         let p_ht = self.tip.as_ref().and_then(|tip| tip.offset);
-        (pose_wo.is_some() || p_ht.is_some()).then_some(Placement { pose_wo, p_ht })
+        let placement = Placement {
+            pose_wo,
+            p_ht,
+            changes: self.changes.clone(),
+        };
+        (placement != Placement::default()).then_some(placement)
     }
 
     /// Whether the scene lets an arm move.
@@ -218,6 +223,7 @@ impl Scene {
             .unwrap_or_else(|_| PatcherParams::new(radius, stiffness, noise));
         params.touches.shape = shape;
         params.touches.cone_cosine = self.sliding.map(|sliding| sliding.cone_cosine);
+        params.touches.changes.clone_from(&self.changes);
         params.free_space = self.carve.is_some();
         if let Some(sync) = &self.sync {
             params.touches.largest_gap_ns = sync.largest_gap_ns;

@@ -72,9 +72,24 @@ fn explained(parameter: &Parameter, indent: usize, is_off: bool) -> String {
     let value = default.as_deref().unwrap_or(example);
     text += format!("{mark}{space}{own_mark}{key}: {value}").trim_end();
     text += "\n";
-    inner.iter().fold(text, |text, below| {
-        text + &explained(below, indent + STEP, is_off || default.is_none())
-    })
+    let is_off = is_off || default.is_none();
+    let inner_of = |indent: usize| {
+        let below = inner.iter().map(|below| explained(below, indent, is_off));
+        below.collect::<String>()
+    };
+    if !parameter.is_list {
+        return text + &inner_of(indent + STEP);
+    }
+    // the first key of the first section begins the list
+    let (space, first) = (
+        " ".repeat(indent + STEP),
+        inner.first().map_or("", |first| first.key),
+    );
+    text + &inner_of(indent + 2 * STEP).replacen(
+        &format!("{space}  {first}:"),
+        &format!("{space}- {first}:"),
+        1,
+    )
 }
 
 /// The summary of a key, with its allowed words.
@@ -106,10 +121,10 @@ fn wrapped(text: &str, width: usize) -> Vec<String> {
 
 /// A section as a table, then its inner sections.
 fn rows(section: &Parameter) -> String {
-    let built = if section.default.is_some() {
-        ""
-    } else {
-        " Off in the default scene."
+    let built = match (&section.default, section.is_list) {
+        (Some(_), _) => "",
+        (None, true) => " A list; empty in the default scene.",
+        (None, false) => " Off in the default scene.",
     };
     let mut text = format!(
         "\n## `{}`\n\n{}{built}\n",

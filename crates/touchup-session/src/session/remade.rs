@@ -62,7 +62,7 @@ impl EvidenceSource<'_> {
         let (mut last_ns, mut are_same) = (None, true);
         each_sample(
             recording,
-            self.placement,
+            self.placement.clone(),
             self.sync,
             None,
             &mut || (),

@@ -70,7 +70,8 @@ pub struct ContactSigma {
     pub reach: f64,
     /// of the point along the normal, by radius and stiffness, which does not average out, m
     pub calibration: f64,
-    /// of the place of the scan, the same displacement in each contact, m
+    /// of the place of the scan and of what was taken off, the same displacement in each contact
+    /// after it, m
     pub place: f64,
     /// of the direction of the normal, rad
     pub normal: f64,

@@ -10,9 +10,9 @@ use nalgebra::{Point3, Vector3};
 
 use crate::reconstruct::evidence::contact_uncertainty::{CalibrationParams, ContactSigma};
 use crate::stylus::{
-    ContactSample, ForceNoise, Friction, FrictionCoefficient, LocalMotion, NormalEstimate,
-    SettingError, Sliding, SmoothedMotion, TipBody, TipContact, TipPlace, TipShape, TouchState,
-    WIDEST_CONE_COSINE,
+    ContactSample, ForceNoise, Friction, FrictionCoefficient, KnownChange, LocalMotion,
+    NormalEstimate, SettingError, Sliding, SmoothedMotion, TipBody, TipContact, TipPlace, TipShape,
+    TouchState, WIDEST_CONE_COSINE,
 };
 use touchup_geometry::numeric::RunningMedian;
 
@@ -21,7 +21,7 @@ use touchup_geometry::numeric::RunningMedian;
 const UNCERTAIN_NORMAL: f64 = 5.0;
 
 /// Settings of the touch finder.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct TouchFinderParams {
     /// radius of the ball, of the flat end or of the nose, m
     pub radius: f64,
@@ -40,6 +40,8 @@ pub struct TouchFinderParams {
     pub cone_cosine: Option<f64>,
     /// residual uncertainty of the calibration; `None`: no uncertainty of contacts
     pub calibration: Option<CalibrationParams>,
+    /// what changed its place and was taken off: touches after it contain its uncertainty
+    pub changes: Vec<KnownChange>,
 }
 
 impl TouchFinderParams {
@@ -53,6 +55,7 @@ impl TouchFinderParams {
             largest_gap_ns: 30_000_000,
             cone_cosine: Some(WIDEST_CONE_COSINE),
             calibration: None,
+            changes: Vec::new(),
         }
     }
 }
@@ -124,7 +127,6 @@ impl TouchFinder {
     pub fn new(params: TouchFinderParams) -> Result<Self, SettingError> {
         Ok(Self {
             body: TipBody::new(params.shape, params.radius)?,
-            params,
             friction: params
                 .cone_cosine
                 .map(|cosine| Friction::new(cosine.clamp(-1.0, 1.0).acos())),
@@ -135,6 +137,7 @@ impl TouchFinder {
             force_noise: ForceNoise::new(),
             held: VecDeque::new(),
             next: 0,
+            params,
         })
     }
 
@@ -305,11 +308,16 @@ impl TouchFinder {
                 let both = [self.noise.length, self.force_noise.sigma() * softness];
                 let [pose, force] = both.map(|noise| noise * motion.centre_gain.sqrt());
                 let bend = force_o.dot(&normal) * softness;
+                let changes = self.params.changes.iter();
+                let of_changes = changes.map(|change| {
+                    change.sigma_along(stamp_ns, &point, (&normal, estimate.sigma), &axis)
+                });
+                let changed = of_changes.fold(0.0, f64::hypot);
                 ContactSigma {
                     noise: (pose * SHARED_POSE).hypot(force),
                     reach: self.params.radius * (1.0 - estimate.sigma.cos()),
                     calibration: calibration.radius.hypot(calibration.stiffness_share * bend),
-                    place: calibration.place,
+                    place: calibration.place.hypot(changed),
                     normal: estimate.sigma,
                 }
             });

@@ -31,7 +31,7 @@ use crate::stylus::{ContactSample, ProbedPoint, SettingError, TipBody, TipShape}
 use touchup_geometry::mesh::{FaceTree, MeshError, Region, TriMesh};
 
 /// Settings of a [`Patcher`].
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct PatcherParams {
     /// settings of the touch finder
     pub touches: TouchFinderParams,
@@ -289,7 +289,7 @@ impl Patcher {
         Ok(Self {
             finder: TouchFinder::new(TouchFinderParams {
                 calibration,
-                ..params.touches
+                ..params.touches.clone()
             })?,
             history: TouchHistory {
                 contacts: ContactMap::new(
@@ -333,7 +333,7 @@ impl Patcher {
             ..history.clone()
         };
         Self {
-            params: *params,
+            params: params.clone(),
             finder: finder.clone(),
             history,
             live: None,

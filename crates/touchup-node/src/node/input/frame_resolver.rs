@@ -344,7 +344,7 @@ mod tests {
         let pose_wo = Some(Isometry3::translation(10.0, 0.0, 0.0));
         let mut resolver = resolver(Some(Placement {
             pose_wo,
-            p_ht: None,
+            ..Placement::default()
         }));
         assert_eq!(resolver.recorded_frame(), "cell");
         assert_eq!(
