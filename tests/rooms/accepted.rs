@@ -273,7 +273,7 @@ fn each_correction_becomes_settings_over_those_of_the_scene() {
     let clock = InputCorrection::WrenchClock(ClockOffset {
         offset: -5e-3,
         sigma: 1e-3,
-        drift: None,
+        change: None,
         evidence: ClockEvidence::Onsets(30),
     });
     assert_eq!(settings(clock), ["sync: { wrench_offset_ms: -3.0000 }"]);

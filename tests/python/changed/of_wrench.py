@@ -77,6 +77,17 @@ def clock_drifts(recording, size):
     return replace(changed, numbers={"wrench_offset_at_first_ms": at_first, "wrench_drift_ppm": size * 1e3 / duration_s})
 
 
+def clock_steps(recording, size):
+    changed = clock(recording, size, lambda of, time, size: size * since(time, of, 0.5), "late from 50 % on")
+    before, half_s = recording.facts["meta"]["wrench_clock_offset_ms"], recording.facts["duration_s"] / 2
+    return replace(changed, numbers={"wrench_offset_before_ms": before, "wrench_offset_after_ms": before + size, "at_s": half_s})
+
+
+def clock_jitters(recording, size):
+    changed = clock(recording, size, lambda of, time, size: of.facts["rng"].normal(0, size, len(time)), "to and fro")
+    return replace(changed, numbers={"stamp_jitter_ms": size})
+
+
 add("tare_x", NEWTONS, tare, AXES["x"])
 add("tare_z", NEWTONS, tare, AXES["z"])
 add("tare_drift", NEWTONS, tare, np.array([0.6, 0.0, 0.8]), drifts=True)
@@ -98,5 +109,5 @@ add("force_low_passed", three(5.0, 15.0, 50.0), low_passed)
 add("clock_delay", MS, clock, lambda of, time, size: size, "late", offset=1)
 add("clock_ahead", MS, clock, lambda of, time, size: -size, "early", offset=-1)
 add("clock_drift", MS, clock_drifts)
-add("clock_step_halfway", three(6.0, 20.0, 60.0), clock, lambda of, time, size: size * since(time, of, 0.5), "late from 50 % on")
-add("clock_jitter", three(3.0, 10.0, 30.0), clock, lambda of, time, size: of.facts["rng"].normal(0, size, len(time)), "to and fro")
+add("clock_step_halfway", three(6.0, 20.0, 60.0), clock_steps)
+add("clock_jitter", three(3.0, 10.0, 30.0), clock_jitters)

@@ -70,7 +70,7 @@ fn the_delay_is_right_within_its_uncertainty_over_twenty_seeds() {
         let ClockOffset {
             offset,
             sigma,
-            drift,
+            change,
             evidence,
         } = found.unwrap_or_else(|| panic!("seed {seed}: nothing found"));
         println!(
@@ -81,8 +81,8 @@ fn the_delay_is_right_within_its_uncertainty_over_twenty_seeds() {
         );
         worst = worst.max((offset - truth).abs() / sigma);
         assert!(
-            sigma < 1e-3 && drift.is_none(),
-            "seed {seed}: {sigma} s, {drift:?}"
+            sigma < 1e-3 && change.is_none(),
+            "seed {seed}: {sigma} s, {change:?}"
         );
     }
     assert!(worst <= 2.0, "{worst} standard uncertainties");
@@ -130,32 +130,80 @@ fn offset_of(samples: impl IntoIterator<Item = Sample>) -> Option<ClockOffset> {
     clock.offset()
 }
 
-/// Down at 50 mm/s, with a stop at the onset of the force: by hand, the delay is the shift of the
-/// stamps.
+/// Down at 50 mm/s every 600 ms, with a stop at the onset of the force: by hand, the delay is the
+/// shift of the stamps.
+///
+/// - `late_ms`: delay of the force at each time, ms.
+fn stops(lasts_ms: i64, late_ms: impl Fn(i64) -> f64) -> Option<ClockOffset> {
+    let at = |ms: i64| {
+        let since_pose = (ms % 600 - 300) as f64;
+        let since_force = (ms as f64 - late_ms(ms)).rem_euclid(600.0) - 300.0;
+        let height = if since_pose < 0.0 {
+            -since_pose * 50e-6
+        } else {
+            0.0
+        };
+        let force = if since_force < 300.0 {
+            2.0 * (1.0 - (-since_force.max(0.0) / 10.0).exp())
+        } else {
+            0.0
+        };
+        sample(ms, height, force)
+    };
+    offset_of((0..lasts_ms).map(at))
+}
+
 #[test]
 fn a_clean_stop_gives_the_delay_that_was_put_in() {
     for late_ms in [-100.0, -40.0, -3.0, 0.0, 2.5, 80.0, 100.0] {
-        let at = |ms: i64| {
-            let since_pose = (ms % 600 - 300) as f64;
-            let since_force = (ms as f64 - late_ms).rem_euclid(600.0) - 300.0;
-            let height = if since_pose < 0.0 {
-                -since_pose * 50e-6
-            } else {
-                0.0
-            };
-            let force = if since_force < 300.0 {
-                2.0 * (1.0 - (-since_force.max(0.0) / 10.0).exp())
-            } else {
-                0.0
-            };
-            sample(ms, height, force)
-        };
-        let found = offset_of((0..12_000).map(at)).unwrap();
+        let found = stops(12_000, |_| late_ms).unwrap();
         assert!(
-            (found.offset * 1e3 - late_ms).abs() < 0.15,
+            (found.offset * 1e3 - late_ms).abs() < 0.15 && found.change.is_none(),
             "{late_ms} ms: {found:?}"
         );
         assert_eq!(found.evidence, ClockEvidence::Onsets(20));
+    }
+}
+
+/// It steps between two stops, 0.6 s apart.
+#[test]
+fn a_clock_that_steps_is_told_by_its_time_and_both_offsets() {
+    for (at_ms, before_ms, after_ms) in [
+        (30_000, 0.0, 20.0),
+        (12_000, -10.0, 50.0),
+        (45_000, 5.0, -5.0),
+    ] {
+        let late_ms = |ms| if ms < at_ms { before_ms } else { after_ms };
+        let found = stops(60_000, late_ms).unwrap();
+        let step = found.step().unwrap_or_else(|| panic!("{found:?}"));
+        let off = [
+            step.offset_before * 1e3 - before_ms,
+            step.offset_after * 1e3 - after_ms,
+        ];
+        assert!(
+            off.iter().all(|off| off.abs() < 3e3 * found.sigma) && found.sigma < 1e-3,
+            "{before_ms}, {after_ms} ms: {found:?}"
+        );
+        let late_s = step.at - at_ms as f64 * 1e-3;
+        assert!(
+            late_s.abs() < 3.0 * step.at_sigma && step.at_sigma < 0.3,
+            "{at_ms} ms: {step:?}"
+        );
+    }
+}
+
+#[test]
+fn a_clock_that_gains_much_in_a_short_session_drifts_and_does_not_step() {
+    for gain_ms in [-90.0, 30.0, 90.0] {
+        let found = stops(30_000, |ms| ms as f64 / 30_000.0 * gain_ms).unwrap();
+        let drift = found.drift().unwrap_or_else(|| panic!("{found:?}"));
+        let sigma_ms = drift.sigma_at_ends(found.sigma) * 1e3;
+        assert!(
+            (drift.offset_at_last * 1e3 - gain_ms).abs() < 3.0 * sigma_ms
+                && drift.offset_at_first.abs() * 1e3 < 3.0 * sigma_ms
+                && sigma_ms < 1.5,
+            "{gain_ms} ms: {found:?}"
+        );
     }
 }
 
@@ -184,32 +232,56 @@ fn where_there_is_nothing_to_see_nothing_is_found() {
 
 /// To and fro at 40 mm/s over a plane, held back by a fifth of 2 N: no onset of contact, and the
 /// force turns with the motion.
+///
+/// - `late_ms`: delay of the force at each time, ms.
+fn strokes(lasts_ms: i64, late_ms: impl Fn(i64) -> i64) -> Option<ClockOffset> {
+    let forth = |ms: i64| if ms.rem_euclid(700) < 400 { 1.0 } else { -1.0 };
+    // it goes to and fro by 4/7 and 3/7 of the time: forward on the whole
+    let mut x = 0.0;
+    let at = |ms: i64| {
+        let pose_ot = Isometry3::translation(x, 0.0, 0.0);
+        x += forth(ms) * 40e-6;
+        let force = Vector3::new(-0.4 * forth(ms - late_ms(ms)), 0.0, 2.0);
+        Sample {
+            stamp_ns: ms * 1_000_000,
+            pose_ot,
+            wrench: Wrench {
+                force,
+                torque: Vector3::zeros(),
+            },
+        }
+    };
+    offset_of((0..lasts_ms).map(at))
+}
+
 #[test]
 fn friction_that_turns_with_the_motion_gives_the_delay_where_contact_never_ends() {
     for late_ms in [-100, -30, 0, 7, 60, 100] {
-        let forth = |ms: i64| if ms.rem_euclid(700) < 400 { 1.0 } else { -1.0 };
-        let at = |ms: i64| {
-            // it goes to and fro by 4/7 and 3/7 of the time: forward on the whole
-            let x: f64 = (0..ms).map(|ms| forth(ms) * 40e-6).sum();
-            let pose_ot = Isometry3::translation(x, 0.0, 0.0);
-            let force = Vector3::new(-0.4 * forth(ms - late_ms), 0.0, 2.0);
-            Sample {
-                stamp_ns: ms * 1_000_000,
-                pose_ot,
-                wrench: Wrench {
-                    force,
-                    torque: Vector3::zeros(),
-                },
-            }
-        };
-        let found = offset_of((0..8_000).map(at)).unwrap();
+        let found = strokes(8_000, |_| late_ms).unwrap();
         assert!(
-            (found.offset * 1e3 - late_ms as f64).abs() < 2.5,
+            (found.offset * 1e3 - late_ms as f64).abs() < 2.5 && found.change.is_none(),
             "{late_ms} ms: {found:?}"
         );
         assert!(
             matches!(found.evidence, ClockEvidence::Course(_)) && found.sigma < 3e-3,
             "{found:?}"
+        );
+    }
+}
+
+#[test]
+fn friction_tells_a_step_where_contact_never_ends() {
+    for (before_ms, after_ms) in [(0, 40), (-20, 30)] {
+        let late_ms = |ms| if ms < 16_000 { before_ms } else { after_ms };
+        let found = strokes(30_000, late_ms).unwrap();
+        let step = found.step().unwrap_or_else(|| panic!("{found:?}"));
+        let off = [
+            step.offset_before * 1e3 - before_ms as f64,
+            step.offset_after * 1e3 - after_ms as f64,
+        ];
+        assert!(
+            off.iter().all(|off| off.abs() < 2.5) && (step.at - 16.0).abs() < 1.0,
+            "{before_ms}, {after_ms} ms: {found:?}"
         );
     }
 }
@@ -244,9 +316,9 @@ fn a_clock_that_drifts_is_told_by_its_rate_and_its_offset_at_first() {
         };
         let found = offset_of((0..LASTS_MS).step_by(4).map(at)).unwrap();
         println!("{late_ms} ms, {ppm} ppm: {found:?}");
-        let Some(drift) = found.drift else {
+        let Some(drift) = found.drift() else {
             assert!(
-                ppm == 0.0 && (found.offset * 1e3 - late_ms).abs() < 2.5,
+                ppm == 0.0 && found.change.is_none() && (found.offset * 1e3 - late_ms).abs() < 2.5,
                 "{late_ms} ms, {ppm} ppm: {found:?}"
             );
             continue;
@@ -281,10 +353,10 @@ fn a_recording_with_a_hole_in_it_shows_no_drift_where_there_is_none() {
                     .iter()
                     .filter(|message| !hole.contains(&message.stamp_ns()))
                     .cloned();
-                let drift = estimated_from(kept).and_then(|found| found.drift);
+                let change = estimated_from(kept).and_then(|found| found.change);
                 assert!(
-                    drift.is_none(),
-                    "seed {seed}, {from_s} s and {rest_s} s: {drift:?}"
+                    change.is_none(),
+                    "seed {seed}, {from_s} s and {rest_s} s: {change:?}"
                 );
             }
         }

@@ -79,6 +79,11 @@ impl InputCorrection {
         }
     }
 
+    /// `None` for a clock that was set while it ran: no setting has two offsets.
+    pub(super) fn of_clock(found: ClockOffset) -> Option<Self> {
+        found.step().is_none().then_some(Self::WrenchClock(found))
+    }
+
     /// Whether the presses show all of it.
     pub fn is_whole(&self) -> bool {
         let Self::Change(change) = self else {

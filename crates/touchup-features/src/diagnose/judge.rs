@@ -4,7 +4,6 @@ use std::collections::BTreeSet;
 
 use nalgebra::{Point3, Vector3};
 
-use super::correction::InputCorrection;
 use super::finding::{InputCause, InputFinding};
 use super::forces::{ForceLevels, NOISES, SensorWeight};
 use super::input_record::InputRecord;
@@ -16,9 +15,7 @@ use super::places::{
 use super::wrench::{ReadPress, course_at, judge_wrench};
 use touchup_geometry::mesh::{FaceTree, TriMesh};
 use touchup_geometry::numeric::{SIGMA_OF_MEDIAN, VoxelKey, counted, median, voxel_of};
-use touchup_method::stylus::{
-    ClockDrift, ClockOffset, SyncParams, TipParams, TipShape, WrenchFrame,
-};
+use touchup_method::stylus::{ClockOffset, TipParams, TipShape, WrenchFrame};
 
 /// Minimum number of presses for a finding.
 pub(super) const FEWEST_PRESSES: usize = 20;
@@ -32,10 +29,6 @@ pub(super) const PLACE_EDGES: f64 = 2.0;
 const WIDE_EDGES: f64 = 4.0;
 /// Maximum number of presses compared with the scan.
 const MOST_PRESSES: usize = 400;
-/// Maximum shift of a touch along the path by a delay, m; half of it gives a doubt.
-const LARGEST_PATH: f64 = 0.32e-3;
-/// Speed of the stylus over the part, m/s.
-const USUAL_SPEED: f64 = 0.04;
 /// Minimum lift of a free ball above a pressing one, m.
 const LEAST_LIFT: f64 = 0.3e-3;
 /// Minimum lift in standard errors of the scan, which may be that low under all resting samples.
@@ -578,67 +571,6 @@ impl InputJudge<'_> {
                 })
             })
             .collect()
-    }
-
-    fn judge_clock(&self) -> Option<InputFinding> {
-        let clock = self.clock?;
-        let ClockOffset {
-            offset,
-            sigma,
-            drift,
-            evidence,
-        } = clock;
-        let largest = drift.map_or(offset.abs(), |of| {
-            of.offset_at_first.abs().max(of.offset_at_last.abs())
-        });
-        let sigma = drift.map_or(sigma, |of| of.sigma_at_ends(sigma));
-        let path = (largest - 3.0 * sigma) * USUAL_SPEED;
-        let [ms, sigma_ms] = [offset, sigma].map(|x| x * 1e3);
-        let SyncParams {
-            wrench_offset_ns,
-            wrench_drift,
-            ..
-        } = self.params.sync;
-        let [applied_ms, applied_ppm] = [wrench_offset_ns as f64 * 1e-6, wrench_drift * 1e6];
-        let beside = match (wrench_offset_ns, wrench_drift) {
-            (0, 0.0) => String::new(),
-            _ => format!(
-                " beside the {applied_ms:+.1} ms and {applied_ppm:+.1} ppm that are applied"
-            ),
-        };
-        let (measured, remedy) = match drift {
-            None => (
-                format!(
-                    "the wrench reads {ms:+.1} ± {sigma_ms:.1} ms beyond the pose{beside}, by {evidence}, which makes {:+.1} ms",
-                    ms + applied_ms
-                ),
-                "give that as sync.wrench_offset_ms",
-            ),
-            Some(ClockDrift {
-                rate,
-                rate_sigma,
-                offset_at_first,
-                offset_at_last,
-            }) => {
-                let [first_ms, last_ms] = [offset_at_first, offset_at_last].map(|x| x * 1e3);
-                let [ppm, ppm_sigma] = [rate, rate_sigma].map(|x| x * 1e6);
-                (
-                    format!(
-                        "the clock of the wrench gains {ppm:+.1} ± {ppm_sigma:.1} ppm on that of the pose and reads \
-                         {first_ms:+.1} ± {sigma_ms:.1} ms beyond it at first, {last_ms:+.1} ms at last{beside}, by {evidence}, \
-                         which makes {:+.1} ppm and {:+.1} ms",
-                        ppm + applied_ppm,
-                        first_ms + applied_ms
-                    ),
-                    "give these as sync.wrench_drift_ppm and sync.wrench_offset_ms",
-                )
-            }
-        };
-        let is_sure = path > LARGEST_PATH;
-        (path > LARGEST_PATH / 2.0).then(|| {
-            InputFinding::new(InputCause::Delay, is_sure, measured, remedy)
-                .corrected_by(Some(InputCorrection::WrenchClock(clock)))
-        })
     }
 }
 

@@ -6,6 +6,7 @@
 //! surface and a force along the surface's outward normal; in free motion it has no force. The
 //! monitor compares each violation with candidate corrections.
 
+mod clock;
 mod correction;
 mod finding;
 mod forces;

@@ -30,7 +30,7 @@ mod tip_shape;
 
 pub use bias::{BiasParams, BiasTracker};
 pub use clocks::clock::ClockEstimator;
-pub use clocks::clock_offset::{ClockDrift, ClockEvidence, ClockOffset};
+pub use clocks::clock_offset::{ClockChange, ClockDrift, ClockEvidence, ClockOffset, ClockStep};
 pub use compensate::{
     Compensator, CompensatorParams, Payload, SensorBias, SensorMount, Tip, WrenchFrame,
 };

@@ -15,19 +15,23 @@ reported! {
     /// Clock offset of the wrench against the pose; never applied automatically.
     #[derive(Clone, Copy)]
     pub struct WrenchOffset, pub fn of(found: &ClockOffset, applied: &SyncParams) {
-        /// total offset, the scene's and the correction; with a drift, at the first sample
-        wrench_offset_ms: f64 =
-            found.drift.map_or(found.offset, |of| of.offset_at_first) * 1e3 + applied.wrench_offset_ns as f64 * 1e-6,
+        /// total offset, the scene's and the correction; at the first sample, if it changes
+        wrench_offset_ms: f64 = found.ends()[0] * 1e3 + applied.wrench_offset_ns as f64 * 1e-6,
         /// standard uncertainty
         sigma_ms: f64 = found.sigma * 1e3,
         /// part applied by the scene
         applied_offset_ms: f64 = applied.wrench_offset_ns as f64 * 1e-6,
         /// total drift, the scene's and the correction
-        wrench_drift_ppm: f64 = (found.drift.map_or(0.0, |of| of.rate) + applied.wrench_drift) * 1e6,
+        wrench_drift_ppm: f64 = (found.drift().map_or(0.0, |of| of.rate) + applied.wrench_drift) * 1e6,
         /// part applied by the scene
         applied_drift_ppm: f64 = applied.wrench_drift * 1e6,
         /// standard uncertainty of the correction; none without a visible drift
-        wrench_drift_sigma_ppm: Option<f64> = found.drift.map(|of| of.rate_sigma * 1e6),
+        wrench_drift_sigma_ppm: Option<f64> = found.drift().map(|of| of.rate_sigma * 1e6),
+        /// time of a step of the offset after the first sample
+        step_at_s: Option<f64> = found.step().map(|of| of.at),
+        /// total offset after the step
+        offset_after_ms: Option<f64> =
+            found.step().map(|of| of.offset_after * 1e3 + applied.wrench_offset_ns as f64 * 1e-6),
         /// source of the estimate
         evidence: ClockEvidence = found.evidence,
     }
@@ -42,6 +46,8 @@ impl fmt::Display for WrenchOffset {
             wrench_drift_ppm,
             applied_drift_ppm,
             wrench_drift_sigma_ppm,
+            step_at_s,
+            offset_after_ms,
             evidence,
         } = *self;
         let is_applied = applied_offset_ms != 0.0 || applied_drift_ppm != 0.0;
@@ -64,6 +70,13 @@ impl fmt::Display for WrenchOffset {
                 f,
                 " at first, and to gain {beside_ppm:+.1} ± {ppm_sigma:.1} ppm"
             )?;
+        }
+        if let (Some(at), Some(after_ms)) = (step_at_s, offset_after_ms) {
+            let after_ms = after_ms - applied_offset_ms;
+            return write!(
+                f,
+                " at first, and {after_ms:+.1} ± {sigma_ms:.1} ms from {at:.1} s on, by {evidence}, not applied"
+            );
         }
         write!(f, ", by {evidence}, not applied; ")?;
         if is_applied {
@@ -204,7 +217,7 @@ mod tests {
         let found = ClockOffset {
             offset: 1.5e-3,
             sigma: 1e-3,
-            drift: None,
+            change: None,
             evidence: ClockEvidence::Onsets(30),
         };
         let told = |wrench_offset_ns| {

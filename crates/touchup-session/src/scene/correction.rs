@@ -50,9 +50,11 @@ impl Scene {
     /// The whole offset of the wrench clock, and its drift if it is evident.
     fn paired_with(&self, found: &ClockOffset) -> Vec<Setting> {
         let applied = self.sync_params();
-        let offset = found.drift.map_or(found.offset, |of| of.offset_at_first);
+        let offset = found.drift().map_or(found.offset, |of| of.offset_at_first);
         let offset_ms = offset * 1e3 + applied.wrench_offset_ns as f64 * 1e-6;
-        let drift = found.drift.map(|of| (of.rate + applied.wrench_drift) * 1e6);
+        let drift = found
+            .drift()
+            .map(|of| (of.rate + applied.wrench_drift) * 1e6);
         let drift = drift.map(|ppm| Setting::word("sync.wrench_drift_ppm", decimal(ppm)));
         let offset = Setting::word("sync.wrench_offset_ms", decimal(offset_ms));
         [offset].into_iter().chain(drift).collect()

@@ -8,14 +8,37 @@ use serde::Serialize;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ClockOffset {
     /// in the middle of the evidence, s; add it to [`crate::stylus::SyncParams::wrench_offset_ns`] unless
-    /// there is a drift
+    /// it changes
     pub offset: f64,
-    /// standard uncertainty, s
+    /// standard uncertainty, s; of a step, the larger one of both offsets
     pub sigma: f64,
-    /// drift, if evident
-    pub drift: Option<ClockDrift>,
+    /// change in the course of time, if evident
+    pub change: Option<ClockChange>,
     /// evidence of the estimate
     pub evidence: ClockEvidence,
+}
+
+/// Change of the offset in the course of time.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ClockChange {
+    /// Even.
+    Drift(ClockDrift),
+    /// At once.
+    Step(ClockStep),
+}
+
+/// A clock of the wrench that was set while it ran.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct ClockStep {
+    /// when, s after the first sample
+    pub at: f64,
+    /// standard uncertainty, s
+    pub at_sigma: f64,
+    /// reading beyond the pose clock before, s
+    pub offset_before: f64,
+    /// reading beyond the pose clock after, s
+    pub offset_after: f64,
 }
 
 /// Gain of the wrench clock on the pose clock.
@@ -30,6 +53,33 @@ pub struct ClockDrift {
     pub offset_at_first: f64,
     /// reading beyond the pose clock at the last sample, s
     pub offset_at_last: f64,
+}
+
+impl ClockOffset {
+    /// The offset at first and at last, s: that in the middle, unless it changes.
+    pub fn ends(&self) -> [f64; 2] {
+        match self.change {
+            None => [self.offset; 2],
+            Some(ClockChange::Drift(of)) => [of.offset_at_first, of.offset_at_last],
+            Some(ClockChange::Step(of)) => [of.offset_before, of.offset_after],
+        }
+    }
+
+    /// The drift, if the offset changes evenly.
+    pub fn drift(&self) -> Option<ClockDrift> {
+        match self.change {
+            Some(ClockChange::Drift(drift)) => Some(drift),
+            _ => None,
+        }
+    }
+
+    /// The step, if the offset changes at once.
+    pub fn step(&self) -> Option<ClockStep> {
+        match self.change {
+            Some(ClockChange::Step(step)) => Some(step),
+            _ => None,
+        }
+    }
 }
 
 impl ClockDrift {
@@ -69,16 +119,6 @@ impl fmt::Display for ClockEvidence {
             Self::Onsets(onsets) => write!(f, "{onsets} onsets of contact"),
             Self::Course(seconds) => write!(f, "{seconds:.0} s of sliding and lifting"),
         }
-    }
-}
-
-/// Maximum difference of two estimates of one delay, beyond their uncertainties, s.
-const AGREED: f64 = 4e-3;
-
-impl ClockOffset {
-    /// Whether another estimate may be of the same delay.
-    pub(in crate::stylus) fn agrees(&self, other: &Self) -> bool {
-        (self.offset - other.offset).abs() <= AGREED + 3.0 * self.sigma.hypot(other.sigma)
     }
 }
 
