@@ -34,7 +34,7 @@ const STEEP: f64 = 0.5;
 const STROKES_PER_UNKNOWN: usize = 4;
 /// Minimum mean square of the normals along each direction in T, for gains: along one that no surface
 /// faces, a gain is another friction.
-const LEAST_FACING: f64 = 0.05;
+const LEAST_FACING: f64 = 0.02;
 
 type ForceVector = SVector<f64, UNKNOWNS>;
 type ForceMatrix = SMatrix<f64, UNKNOWNS, UNKNOWNS>;
